@@ -14,7 +14,7 @@ from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
-from iveg.robot.uplink import Uplink
+from iveg.robot.uplink import Origins, Uplink
 
 RATE_HZ = 30.0
 SECONDS = 20
@@ -30,7 +30,7 @@ def spent(world: SimulatedWorld) -> dict[str, float]:
     """CPU seconds of each part over ``SECONDS`` of the world's own time."""
     parts = dict.fromkeys(("people", "drive", "laser", "camera"), 0.0)
     uplinks = {
-        robot_id: Uplink(robot_id, "iveg", "b00t", lambda *_: None)
+        robot_id: Uplink(robot_id, "iveg", Origins("b00t"), lambda *_: None)
         for robot_id in world.rigs
     }
 

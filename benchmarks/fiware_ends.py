@@ -22,7 +22,7 @@ import orjson
 import uvloop
 
 from benchmarks.process import pause
-from iveg.lab.embedded.mqtt_packets import publish_packet
+from iveg.lab.embedded.mqtt_broker import publish_packet
 
 RATE_HZ = 30
 TOPICS = 3

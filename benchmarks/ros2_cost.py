@@ -38,7 +38,6 @@ from iveg.domain.observations import Origin, SafetyReport
 from iveg.ngsi import codec
 from iveg.ros2 import cdr, names
 from iveg.ros2 import messages as ros
-from iveg.ros2.cdr import store_of
 from iveg.ros2.messages import Message
 from tests.brokers import broker_on
 from tests.dds import free_domain, loopback
@@ -63,7 +62,7 @@ _ANY = SampleState.NotRead | ViewState.Any | InstanceState.Any
 
 def decoded(message: type[Message]) -> Any:
     """A type whose samples Cyclone's own Python makes and reads."""
-    return structure(store_of(message), message.ROS, struct_of)
+    return structure(message.STORE, message.ROS, struct_of)
 
 
 def bare(domain: int) -> None:

@@ -25,7 +25,7 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency import LatencyWatch
 from iveg.domain.observations import Instant
 from iveg.domain.rule.trial import Trial
-from iveg.domain.tracking.calibration import Calibrations
+from iveg.domain.tracking.looks import Calibrations
 from iveg.domain.tracking.people import People
 from iveg.domain.transports import FIWARE, Transport
 from iveg.domain.words import WordAnswer

@@ -21,7 +21,7 @@ from starlette.routing import Route
 from iveg.cli.running import report_ready, run_until_stopped
 from iveg.lab.embedded.context_broker import ContextBroker
 from iveg.lab.embedded.entities import Scope
-from iveg.lab.embedded.iot_agent import IotAgent, iota_api
+from iveg.lab.embedded.iot_agent import IotAgent
 from iveg.lab.embedded.mqtt_broker import MqttBroker
 from iveg.lab.embedded.server import Running, embedded_fiware, serve_fiware
 from iveg.settings import Settings
@@ -79,18 +79,16 @@ class FaultyAgent(IotAgent):
             await asyncio.sleep(self._faults.slow_s)
         await super().command(scope, name, kind, values)
 
+    def north_port(self) -> Starlette:
+        """The agent's own, with one more request."""
 
-def faulty_api(agent: IotAgent) -> Starlette:
-    """The agent's north port, with one more request."""
-    assert isinstance(agent, FaultyAgent)
+        async def take_faults(request: Request) -> Response:
+            self.fail(Faults(**await request.json()))
+            return Response(status_code=204)
 
-    async def take_faults(request: Request) -> Response:
-        agent.fail(Faults(**await request.json()))
-        return Response(status_code=204)
-
-    app = iota_api(agent)
-    app.router.routes.append(Route("/test/faults", take_faults, methods=["POST"]))
-    return app
+        app = super().north_port()
+        app.router.routes.append(Route("/test/faults", take_faults, methods=["POST"]))
+        return app
 
 
 def fail(up: Running, faults: Faults) -> None:
@@ -101,7 +99,7 @@ def fail(up: Running, faults: Faults) -> None:
 
 def faulty_fiware() -> AbstractAsyncContextManager[Running]:
     """On free ports, while the block lasts."""
-    return embedded_fiware(make_agent=FaultyAgent, make_api=faulty_api)
+    return embedded_fiware(make_agent=FaultyAgent)
 
 
 def main() -> int:
@@ -116,7 +114,6 @@ def main() -> int:
             iota,
             notify_ready=report_ready,
             make_agent=FaultyAgent,
-            make_api=faulty_api,
         )
     )
 

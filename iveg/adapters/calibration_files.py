@@ -1,13 +1,12 @@
 """Calibration files: TOML in, rows by detector and class out (docs/safety.md)."""
 
-from importlib import resources
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from iveg.adapters.toml_files import Table, complaint, read_table, read_text
 from iveg.domain.parameters import Class
-from iveg.domain.tracking.calibration import ANY, Calibration, Calibrations
+from iveg.domain.tracking.looks import ANY, Calibration, Calibrations
 
 PAPER = "paper"
 """Name of the file with the counts of the paper's field test."""
@@ -18,31 +17,29 @@ def load_calibrations(name_or_file: str) -> Calibrations:
     """The rows of a file, or of ``paper``; none of an empty name.
 
     Raises:
-        DataFileError: the file cannot be used; it says file, line and column.
+        DataFileError: the file cannot be used; it says file and key.
     """
     if not name_or_file:
         return Calibrations()
-    if name_or_file == PAPER:
-        file = resources.files("iveg") / "data" / "calibration.toml"
-        return read_calibrations(file.read_text("utf-8"), "calibration.toml")
-    return read_calibrations(read_text(name_or_file), name_or_file)
+    text = read_text(name_or_file, {PAPER: "calibration.toml"})
+    return read_calibrations(text, name_or_file)
 
 
 def read_calibrations(text: str, file: str) -> Calibrations:
     """Read rows from TOML; ``file`` is its name in complaints.
 
     Raises:
-        DataFileError: naming file, line, column, key and reason.
+        DataFileError: naming file, key and reason.
     """
     rows: dict[tuple[str, Class], Calibration] = {}
     for index, row in enumerate(read_table(text, file, _FileTable).calibrations):
         if not row.right + row.wrong:
             reason = "counts no box, with the row's `wrong`"
-            raise complaint(text, file, ("calibrations", index, "right"), reason)
+            raise complaint(file, ("calibrations", index, "right"), reason)
         key = row.detector or ANY, row.class_
         if key in rows:
             reason = "is of a detector and class that have a row already"
-            raise complaint(text, file, ("calibrations", index, "class"), reason)
+            raise complaint(file, ("calibrations", index, "class"), reason)
         rows[key] = Calibration.of_counts(row.right, row.wrong, row.mean_confidence)
     return Calibrations(rows)
 

@@ -42,7 +42,7 @@ from rosbags.interfaces import Nodetype
 
 from iveg.adapters.dds_network import DdsNetwork, used_of
 from iveg.domain.errors import HopError
-from iveg.ros2.cdr import read_user_data, store_of, user_data
+from iveg.ros2.cdr import read_user_data, user_data
 from iveg.ros2.messages import Message
 from iveg.ros2.names import Endpoint, Qos, dds_topic, dds_type, ros_topic, ros_type
 
@@ -73,7 +73,7 @@ def _leave_in_bytes(kind: type[IdlStruct]) -> None:
 @cache
 def announced(message: type[Message]) -> type[IdlStruct]:
     """The type that DDS announces for a message."""
-    return structure(store_of(message), message.ROS, _in_bytes)
+    return structure(message.STORE, message.ROS, _in_bytes)
 
 
 @cache

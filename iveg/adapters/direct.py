@@ -20,6 +20,7 @@ from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec, names
 
 Recorded = Callable[[str, bytes, Instant], None]
+IsEarly = Callable[[str, type[Observation], float], bool]
 _WIDER: Sequence[Scope] = ("off", "safety", "all")
 
 
@@ -36,7 +37,6 @@ class _Source:
     Attributes:
         read: Reads a payload.
         kind: Kind of all its messages; None: they are of several.
-        apart_s: Least time between two of a robot that are read (s).
         sparse: Its topic has two safety reports a second; see ``Received``.
     """
 
@@ -44,7 +44,6 @@ class _Source:
     qos: int
     read: Callable[[bytes], codec.ReadResult]
     kind: type[Observation] | None = None
-    apart_s: float = 0.0
     sparse: bool = True
 
 
@@ -56,6 +55,7 @@ class DirectReader:
         scope: What is read; ``safety`` leaves poses, scans and intent to FIWARE.
         is_past: Tells by its identity what FIWARE has already brought.
         recorded: Told of each message that is read: topic, payload, and when.
+        is_early: Whether a message comes too soon after one of its kind to be read.
     """
 
     def __init__(
@@ -68,6 +68,7 @@ class DirectReader:
         scope: Scope = "all",
         is_past: codec.IsPast | None = None,
         recorded: Recorded = lambda *_: None,
+        is_early: IsEarly = lambda *_: False,
     ) -> None:
         self._clock = clock
         self._enqueue = enqueue
@@ -76,7 +77,7 @@ class DirectReader:
         self._recorded = recorded
         kinds = _read_in(scope)
         self._kinds = tuple(kind.of for kind in kinds)
-        self._due: dict[tuple[str, type[Observation]], float] = {}
+        self._is_early = is_early
         self._sources = {
             topic: source
             for robot_id in robots
@@ -95,7 +96,7 @@ class DirectReader:
                 continue
             name = robot_id + kind.suffix
             read = partial(measure, name)
-            source = _Source(robot_id, kind.qos, read, kind.of, kind.apart_s)
+            source = _Source(robot_id, kind.qos, read, kind.of)
             yield names.measure_topic(apikey, name), source
             if kind.speaks_alone:
                 alone = names.direct_topic(robot_id, kind.suffix)
@@ -106,9 +107,12 @@ class DirectReader:
             answer = partial(codec.read_answer, robot_id)
             yield names.answer_topic(apikey, robot_id), _Source(robot_id, 1, answer)
 
-    def subscriptions(self) -> dict[str, int]:
-        """Topics and their QoS."""
-        return {topic: source.qos for topic, source in self._sources.items()}
+    def subscriptions(self) -> dict[str, dict[str, int]]:
+        """Topics of each robot, and their QoS."""
+        found: dict[str, dict[str, int]] = {}
+        for topic, source in self._sources.items():
+            found.setdefault(source.robot_id, {})[topic] = source.qos
+        return found
 
     def stream(self, topic: str) -> tuple[str, type[Observation]] | None:
         """The robot and the one kind of what comes on a topic, if it is one."""
@@ -129,7 +133,8 @@ class DirectReader:
         if source is None:
             return
         at = self._clock()
-        if self._is_early(source, at.mono):
+        kind = source.kind
+        if kind is not None and self._is_early(source.robot_id, kind, at.mono):
             return
         self._recorded(topic, payload, at)
         reading = source.read(payload)
@@ -140,13 +145,3 @@ class DirectReader:
                 self._enqueue(
                     Received(observation, at, DIRECT.id, sparse=source.sparse)
                 )
-
-    def _is_early(self, source: _Source, now: float) -> bool:
-        """Whether nobody would look at it: one of its kind has just been read."""
-        if source.kind is None or source.apart_s == 0.0:
-            return False
-        stream = source.robot_id, source.kind
-        if now < self._due.get(stream, 0.0):
-            return True
-        self._due[stream] = now + source.apart_s
-        return False

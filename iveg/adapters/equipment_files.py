@@ -1,7 +1,6 @@
 """Equipment files: TOML in, checked tiles out (docs/equipment.md)."""
 
 from collections.abc import Sequence
-from importlib import resources
 from typing import Annotated, Self
 
 from pydantic import (
@@ -28,14 +27,12 @@ def load_equipment(name_or_file: str, robots: Sequence[str] = ()) -> tuple[Tile,
         robots: The fleet, whose entities and devices are no equipment's.
 
     Raises:
-        DataFileError: the file cannot be used; it says file, line and column.
+        DataFileError: the file cannot be used; it says file and key.
     """
     if not name_or_file:
         return ()
-    if name_or_file == DEMO:
-        file = resources.files("iveg") / "data" / "equipment.toml"
-        return read_equipment(file.read_text("utf-8"), "equipment.toml", robots)
-    return read_equipment(read_text(name_or_file), name_or_file, robots)
+    text = read_text(name_or_file, {DEMO: "equipment.toml"})
+    return read_equipment(text, name_or_file, robots)
 
 
 def read_equipment(
@@ -44,14 +41,14 @@ def read_equipment(
     """Read tiles from TOML; ``file`` is its name in complaints.
 
     Raises:
-        DataFileError: naming file, line, column, key and reason.
+        DataFileError: naming file, key and reason.
     """
     page = read_table(text, file, _FileTable)
     tiles = tuple(one.value() for one in page.tiles)
     wrong = contradiction(tiles) or _taken(tiles, robots)
     if wrong is not None:
         index, key, reason = wrong
-        raise complaint(text, file, ("tiles", index, key), reason)
+        raise complaint(file, ("tiles", index, key), reason)
     return tiles
 
 

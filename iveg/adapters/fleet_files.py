@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from importlib import resources
 from typing import Annotated, Literal, Self
 
 from pydantic import (
@@ -44,7 +43,7 @@ def load_fleet(file: str = "", words: Sequence[str] = ()) -> FleetDescription:
             said here counts before that of the file.
 
     Raises:
-        DataFileError: the file cannot be used; it says file, line and column.
+        DataFileError: the file cannot be used; it says file and key.
     """
     known = built_in() if not file else read_fleet(read_text(file), file)
     if not words:
@@ -60,23 +59,22 @@ def load_fleet(file: str = "", words: Sequence[str] = ()) -> FleetDescription:
 @cache
 def built_in() -> FleetDescription:
     """The built-in robots: AGI and AGII."""
-    text = (resources.files("iveg") / "data" / "fleet.toml").read_text("utf-8")
-    return read_fleet(text, "fleet.toml")
+    return read_fleet(read_text("built-in", {"built-in": "fleet.toml"}), "fleet.toml")
 
 
 def read_fleet(text: str, file: str) -> FleetDescription:
     """Read a fleet from TOML; ``file`` is its name in complaints.
 
     Raises:
-        DataFileError: naming file, line, column, key and reason.
+        DataFileError: naming file, key and reason.
     """
     page = read_table(text, file, _FileTable)
     robots = [one.value() for one in page.robots]
     names = [one.robot_id for one in robots]
     for index, name in enumerate(names):
         if name in names[:index]:
-            path = ("robots", index, "id")
-            raise complaint(text, file, path, f"{name} is in the list twice")
+            reason = f"{name} is in the list twice"
+            raise complaint(file, ("robots", index, "id"), reason)
     return FleetDescription.of(robots)
 
 

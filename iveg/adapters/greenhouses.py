@@ -1,18 +1,15 @@
 """Greenhouse files: TOML in, a checked ``Greenhouse`` out.
 
-An unusable file is refused with its line, its key and the reason, so that a grower
-who measured a greenhouse can mend the file without reading this code.
+An unusable file is refused with key and reason, so that a grower who measured a
+greenhouse can mend the file without reading this code.
 """
 
 from collections.abc import Sequence
-from importlib import resources
-from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from iveg.adapters.toml_files import Table, complaint, read_table
-from iveg.domain.errors import DataFileError
+from iveg.adapters.toml_files import Table, complaint, read_table, read_text
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import (
     OUTSIDE_M,
@@ -32,23 +29,15 @@ def load_greenhouse(name_or_file: str) -> Greenhouse:
     Raises:
         DataFileError: no such greenhouse, or one that cannot be used.
     """
-    if name_or_file in BUILT_IN:
-        file = resources.files("iveg") / "data" / "greenhouses" / f"{name_or_file}.toml"
-        return read_greenhouse(file.read_text("utf-8"), f"{name_or_file}.toml")
-    try:
-        text = Path(name_or_file).read_text("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        known = ", ".join(BUILT_IN)
-        reason = f"is neither a greenhouse of iVeg ({known}) nor a file in UTF-8."
-        raise DataFileError(name_or_file, "", reason) from error
-    return read_greenhouse(text, name_or_file)
+    own = {name: f"greenhouses/{name}.toml" for name in BUILT_IN}
+    return read_greenhouse(read_text(name_or_file, own), name_or_file)
 
 
 def read_greenhouse(text: str, file: str) -> Greenhouse:
     """Read a greenhouse from TOML; ``file`` is its name in complaints.
 
     Raises:
-        DataFileError: naming file, line, column, key and reason.
+        DataFileError: naming file, key and reason.
     """
     page = read_table(text, file, _FileTable)
     bounds = page.bounds.area()
@@ -57,7 +46,7 @@ def read_greenhouse(text: str, file: str) -> Greenhouse:
         for index, item in enumerate(items):
             # A typing slip seldom stays within the outer wall.
             if not all(bounds.contains(x, y) for x, y in item.corners()):
-                raise complaint(text, file, (name, index), "lies outside bounds")
+                raise complaint(file, (name, index), "lies outside bounds")
     return Greenhouse(
         page.name,
         bounds,

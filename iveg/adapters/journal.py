@@ -1,4 +1,4 @@
-"""The journal of orders: what is wanted of each robot, and each step of an order.
+"""The journal of orders: the desired state of each robot, and each step of an order.
 
 A file of JSON lines that are on disk before an order is accepted; it outlives a crash
 of iVeg, a lost database and a full disk.  A line of a robot's desired state that says
@@ -9,13 +9,14 @@ once it holds them, the file is compacted to the lines that still count.
 import asyncio
 import logging
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
 import orjson
+from pydantic import TypeAdapter
 
 from iveg.adapters.files import Form, ReservedFile, read_lines
 from iveg.domain.errors import DataFileError
@@ -27,8 +28,6 @@ from iveg.vital.record import Waiting
 _log = logging.getLogger(__name__)
 
 FORM = Form("stop-journal")
-_STOPPED = {"stopped": True, "run": False}
-_Facts = tuple[str, str | None, tuple[str, ...], str | None]
 _KINDS = {kind.__name__: kind for kind in RECORD_TYPES}
 _NAMED_KEPT = 64
 """As many as a robot remembers to have released."""
@@ -36,6 +35,29 @@ _LEAST_COMPACTED = 2**18
 """Bytes: a smaller file is left as it is while iVeg runs."""
 _MOST_WAITING = 10_000
 """Lines that a disk has refused are written again later: the newest of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Wish:
+    """One line of a robot's desired state.
+
+    Attributes:
+        named: Holds that a release is about to name; None in a line of the earlier
+            version, which does not say what a release has named.
+        ch: The challenge of that release.
+    """
+
+    robot_id: str
+    desired: Literal["stopped", "run"]
+    by: str
+    at: float = 0.0
+    hold_id: str | None = None
+    named: tuple[str, ...] | None = None
+    ch: str | None = None
+
+
+_WISH: Final = TypeAdapter(_Wish)
+_Line = _Wish | Waiting
 
 
 class FileJournal:
@@ -57,10 +79,10 @@ class FileJournal:
         self._memory: dict[str, _Memory] = defaultdict(_Memory)
         self._rows: dict[int, Waiting] = {}
         """Rows on disk that the history may not hold, by revision."""
-        self._newest: dict[str, _Facts] = {}
-        """The facts of each robot's newest line of this run."""
-        self._waiting: list[Json | Waiting] = []
-        """What is not on disk yet, oldest first."""
+        self._newest: dict[str, _Wish] = {}
+        """Each robot's newest line of this run, without its author and time."""
+        self._waiting: list[_Line] = []
+        """Lines that are not on disk yet, oldest first."""
         self._compacts_at = _LEAST_COMPACTED
 
     # --- at the start -------------------------------------------------------------
@@ -76,16 +98,13 @@ class FileJournal:
         for number, line in self._lines():
             lines += 1
             try:
-                self._take(orjson.loads(line))
+                self._take(_read(line))
             except (KeyError, TypeError, ValueError):
                 _log.warning("%s, line %d: not readable, skipped", self._path, number)
         if not self._is_newer:
             self._tidy(lines)
-        return {
-            robot_id: one.wanted
-            for robot_id, one in self._memory.items()
-            if one.wanted is not None
-        }
+        found = {name: memory.wanted() for name, memory in self._memory.items()}
+        return {name: wanted for name, wanted in found.items() if wanted is not None}
 
     def left(self) -> Sequence[Waiting]:
         """Rows of orders that the history may not hold."""
@@ -104,13 +123,11 @@ class FileJournal:
                 self._path.read_bytes().rstrip(b"\0").splitlines()[1:], 2
             )
 
-    def _take(self, entry: Json) -> None:
-        if "kind" in entry:
-            row = _read_row(entry)
-            self._rows[row.revision] = row
-            return
-        robot_id, stopped = str(entry["robot_id"]), _STOPPED[entry["desired"]]
-        self._memory[robot_id].read_line(entry, str(entry["by"]), stopped=stopped)
+    def _take(self, line: _Line) -> None:
+        if isinstance(line, Waiting):
+            self._rows[line.revision] = line
+        else:
+            self._memory[line.robot_id].take(line)
 
     def _tidy(self, lines: int) -> None:
         fewest, spilled = self._fewest(), self._spilled
@@ -127,12 +144,10 @@ class FileJournal:
 
     def _fewest(self) -> list[bytes]:
         """The lines that still count."""
-        counting: list[Json | Waiting] = [
-            entry
-            for robot_id, one in self._memory.items()
-            for entry in one.entries(robot_id)
-        ]
-        return [_line_of(one) for one in (*counting, *self._rows.values())]
+        lines: list[_Line] = []
+        for memory in self._memory.values():
+            lines += memory.lines()
+        return [_line_of(line) for line in (*lines, *self._rows.values())]
 
     # --- while iVeg runs ----------------------------------------------------------
 
@@ -148,7 +163,7 @@ class FileJournal:
 
         A disk that fails is logged and does not hold up the STOP.
         """
-        self._waiting.append(_entry(robot_id, desired, hold_id, by, at.wall))
+        self._waiting.append(_Wish(robot_id, desired, by, at.wall, hold_id, ()))
         await self.flushed()
 
     async def log_release(
@@ -161,8 +176,9 @@ class FileJournal:
         at: Instant,
     ) -> None:
         """Append the STOPs that a release is about to name; likewise."""
-        entry = _entry(robot_id, "stopped", hold_id, by, at.wall, ids, challenge)
-        self._waiting.append(entry)
+        named = tuple(ids)
+        wish = _Wish(robot_id, "stopped", by, at.wall, hold_id, named, challenge)
+        self._waiting.append(wish)
         await self.flushed()
 
     def note(self, row: Waiting) -> None:
@@ -190,7 +206,8 @@ class FileJournal:
                     self._newest.clear()
                     self._waiting = [*batch, *self._waiting][-_MOST_WAITING:]
             if is_written:
-                self._remember(fresh)
+                for line in fresh:
+                    self._take(line)
 
     async def committed(self, revisions: Collection[int]) -> None:
         """Let go of rows that the history holds, and compact the file where it grew."""
@@ -219,103 +236,84 @@ class FileJournal:
     async def _in_thread(self, work: Callable[[bytes], None], lines: bytes) -> None:
         await asyncio.get_running_loop().run_in_executor(self._thread, work, lines)
 
-    def _is_news(self, one: Json | Waiting) -> bool:
-        """Whether a line says anything new; each row of an order does."""
-        if isinstance(one, Waiting):
+    def _is_news(self, line: _Line) -> bool:
+        """Whether a line says anything new; each row of an order does.
+
+        The audit has who said it again, and when.
+        """
+        if isinstance(line, Waiting):
             return True
-        robot_id, facts = one["robot_id"], _facts_of(one)
-        is_news = self._newest.get(robot_id) != facts
-        self._newest[robot_id] = facts
+        facts = replace(line, by="", at=0.0)
+        is_news = self._newest.get(line.robot_id) != facts
+        self._newest[line.robot_id] = facts
         return is_news
 
-    def _remember(self, written: Iterable[Json | Waiting]) -> None:
-        for one in written:
-            if isinstance(one, Waiting):
-                self._rows[one.revision] = one
-            else:
-                self._take(one)
 
-
-def _line_of(one: Json | Waiting) -> bytes:
-    if not isinstance(one, Waiting):
-        return orjson.dumps(one) + b"\n"
-    head = {"kind": type(one.record).__name__, "revision": one.revision}
+def _line_of(line: _Line) -> bytes:
+    if isinstance(line, _Wish):
+        return orjson.dumps(line) + b"\n"
+    head = {"kind": type(line.record).__name__, "revision": line.revision}
     try:
-        return orjson.dumps(head | {"record": asdict(one.record)}) + b"\n"
+        return orjson.dumps(head | {"record": asdict(line.record)}) + b"\n"
     except orjson.JSONEncodeError as error:
         _log.error("the command journal cannot hold a %s: %s", head["kind"], error)
         return b""
 
 
-def _read_row(entry: Json) -> Waiting:
+def _read(line: bytes) -> _Line:
+    entry: Json = orjson.loads(line)
+    if "kind" not in entry:
+        return _WISH.validate_python(entry)
     kind, members = _KINDS[entry["kind"]], entry["record"]
     known = {one.name: members[one.name] for one in fields(kind) if one.name in members}
     return Waiting(kind(**known), int(entry["revision"]), 0.0)
-
-
-def _facts_of(entry: Json) -> _Facts:
-    """What a line says of its robot; who said it again, and when, is in the audit."""
-    return entry["desired"], entry["hold_id"], tuple(entry["named"]), entry["ch"]
-
-
-def _entry(
-    robot_id: str,
-    desired: Literal["stopped", "run"],
-    hold_id: str | None,
-    by: str,
-    wall: float,
-    named: Sequence[str] = (),
-    challenge: str | None = None,
-) -> dict[str, object]:
-    return {
-        "at": wall,
-        "robot_id": robot_id,
-        "desired": desired,
-        "hold_id": hold_id,
-        "by": by,
-        "named": list(named),
-        "ch": challenge,
-    }
 
 
 class _Memory:
     """The content of one robot's lines so far."""
 
     def __init__(self) -> None:
-        self.wanted: DesiredRecord | None = None
-        self._by, self._at = "", 0.0
+        self._newest: _Wish | None = None
         self._named: tuple[str, ...] = ()
-        self._asked: tuple[str, ...] = ()
-        self._challenge: str | None = None
+        self._release: _Wish | None = None
+        """The newest release, if nothing has confirmed it."""
 
-    def read_line(self, entry: Json, by: str, *, stopped: bool) -> None:
+    def take(self, wish: _Wish) -> None:
         """Read one line more."""
-        # A line of the earlier version does not say what a release has named.
-        named = entry.get("named")
-        hold_id = None if named is None else entry["hold_id"]
-        self._by, self._at = by, entry.get("at", 0.0)
+        if wish.named is None:
+            # A release may have named its hold.
+            wish = replace(wish, hold_id=None)
+        self._newest, named = wish, wish.named or ()
         if named:
-            self._asked, self._challenge = tuple(named), entry["ch"]
+            self._release = wish
             fresh = tuple(one for one in self._named if one not in named)
             self._named = (*fresh, *named)[-_NAMED_KEPT:]
-        if not stopped:
-            self.wanted, self._asked, self._challenge = None, (), None
-            return
-        self.wanted = DesiredRecord(
-            by, hold_id, self._named, self._asked, self._challenge
+        if wish.desired == "run":
+            self._release = None
+
+    def wanted(self) -> DesiredRecord | None:
+        """The desire that the robot stands; None where it may drive."""
+        newest, release = self._newest, self._release
+        if newest is None or newest.desired == "run":
+            return None
+        challenge = None if release is None else release.ch
+        return DesiredRecord(
+            newest.by, newest.hold_id, self._named, self._asked(), challenge
         )
 
-    def entries(self, robot_id: str) -> Iterator[dict[str, object]]:
+    def lines(self) -> Iterator[_Wish]:
         """The fewest lines with the same content."""
-        by, at, hold_id = self._by, self._at, None
-        if self.wanted is not None:
-            hold_id = self.wanted.hold_id
-        older = [one for one in self._named if one not in self._asked]
+        if self._newest is None:
+            return
+        last = replace(self._newest, named=(), ch=None)
+        older = tuple(one for one in self._named if one not in self._asked())
         if older:
             # Named, and since then over.
-            yield _entry(robot_id, "run", None, by, at, older)
-        if self._asked:
-            asked = self._asked
-            yield _entry(robot_id, "stopped", hold_id, by, at, asked, self._challenge)
-        desired: Literal["stopped", "run"] = "run" if self.wanted is None else "stopped"
-        yield _entry(robot_id, desired, hold_id, by, at)
+            yield replace(last, desired="run", hold_id=None, named=older)
+        if self._release is not None:
+            yield replace(last, named=self._asked(), ch=self._release.ch)
+        yield last
+
+    def _asked(self) -> tuple[str, ...]:
+        """Holds that the open release has named."""
+        return () if self._release is None else self._release.named or ()

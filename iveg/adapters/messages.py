@@ -53,9 +53,7 @@ def load_messages(file: str) -> MessagePlan:
     for key, rows in (("address", page.address), ("escalation", page.escalation)):
         for index, one in enumerate(rows):
             if _opened(one.url) is None:
-                raise complaint(
-                    text, file, (key, index, "url"), "is not one of apprise"
-                )
+                raise complaint(file, (key, index, "url"), "is not one of apprise")
             found.append(Address(one.name, one.url, one.least, key == "escalation"))
     return MessagePlan(tuple(found), page.escalate_after_min * 60, page.language)
 

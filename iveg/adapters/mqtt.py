@@ -13,7 +13,8 @@ import random
 import socket
 import ssl
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -171,17 +172,21 @@ class MqttLink:
         on_connect: Callable[[], None] = lambda: None,
         on_loss: Callable[[], None] = lambda: None,
         on_stored: Callable[[str, bytes], None] | None = None,
+        apart: Sequence[Mapping[str, int]] = (),
     ) -> None:
         """Set the readers, before ``run``; they may be built after the link.
 
         Args:
             subscriptions: As above, and so for the others.
+            apart: Subscriptions that have a connection of their own each; all come
+                and go together.  A turn of the loop reads one message a connection,
+                so a flood on one delays no message of another.
             on_message: Called with each message.
             on_connect: Called after every (re)connect, subscriptions in place.
             on_loss: Called once when a connection is lost.
             on_stored: Called with what the broker retained; None: ``on_message`` is.
         """
-        self._subscriptions = dict(subscriptions)
+        self._subscriptions = (subscriptions, *apart)
         self._on_message = on_message
         self._on_connect = on_connect
         self._on_loss = on_loss
@@ -223,8 +228,34 @@ class MqttLink:
             pause = min(_LONGEST_PAUSE_S, 2 * pause)
 
     async def _session(self) -> None:
-        address, files = self._address, self._address.files.state()
-        async with aiomqtt.Client(
+        files = self._address.files.state()
+        async with AsyncExitStack() as connections:
+            self._early.clear()
+            clients = []
+            for subscriptions in self._subscriptions:
+                client = await connections.enter_async_context(self._new_client())
+                for topic_filter, qos in subscriptions.items():
+                    await client.subscribe(topic_filter, qos=qos)
+                clients.append(client)
+            _heed_cancellation()
+            self._client = clients[0]
+            self._loss_told = False
+            self.connects += 1
+            _log.info("%s: connected to the broker", self._name)
+            self._on_connect()
+            sender = asyncio.create_task(
+                self._send_offered(clients[0]), name=f"mqtt-send-{self._name}"
+            )
+            try:
+                while self._early:
+                    self._hand_over(self._early.popleft())
+                await self._until_over(clients, files)
+            finally:
+                sender.cancel()
+
+    def _new_client(self) -> aiomqtt.Client:
+        address = self._address
+        return aiomqtt.Client(
             address.host,
             address.port,
             username=address.user,
@@ -236,41 +267,31 @@ class MqttLink:
             queue_type=_handing_to(self._take),
             # A STOP never waits until the broker has confirmed telemetry.
             max_inflight_messages=0,
-        ) as client:
-            self._early.clear()
-            for topic_filter, qos in self._subscriptions.items():
-                await client.subscribe(topic_filter, qos=qos)
-            _heed_cancellation()
-            self._client = client
-            self._loss_told = False
-            self.connects += 1
-            _log.info("%s: connected to the broker", self._name)
-            self._on_connect()
-            sender = asyncio.create_task(
-                self._send_offered(client), name=f"mqtt-send-{self._name}"
-            )
-            try:
-                while self._early:
-                    self._hand_over(self._early.popleft())
-                await self._until_over(client, files)
-            finally:
-                sender.cancel()
+        )
 
-    async def _until_over(self, client: aiomqtt.Client, files: FileState) -> None:
-        """Until the connection is lost (MqttError), or its certificate is another."""
-        lost = asyncio.ensure_future(_end_of(client))
+    async def _until_over(
+        self, clients: Sequence[aiomqtt.Client], files: FileState
+    ) -> None:
+        """Until a connection is lost (MqttError), or its certificate is another."""
+        lost = [asyncio.ensure_future(_end_of(client)) for client in clients]
         try:
             while True:
-                await asyncio.wait({lost}, timeout=self._look_every_s)
-                if lost.done():
-                    return lost.result()
+                done, _ = await asyncio.wait(
+                    lost,
+                    timeout=self._look_every_s,
+                    return_when=asyncio.FIRST_COMPLETED,
+                )
+                for one in done:
+                    return one.result()
                 now = self._address.files.state()
                 if now != files and self._can_connect():
                     _log.info("%s: a new certificate: connecting anew", self._name)
                     return None
                 files = now
         finally:
-            lost.cancel()
+            for one in lost:
+                one.cancel()
+            await asyncio.gather(*lost, return_exceptions=True)
 
     def _can_connect(self) -> bool:
         """Whether the files fit together: half-written ones end no connection."""

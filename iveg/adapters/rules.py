@@ -1,14 +1,11 @@
-"""Versions of the rule, in a small file of JSON lines that is replaced as a whole.
+"""The rule's versions and its trial, each in a small file of JSON lines.
 
 The settings make the first version.  A person's change outlives a restart, until the
 settings themselves change: then these are newer, and a version of their own.  A version
 in which looks did not add up yet stays as it was, and the next one has them.  A file
 with a line that cannot be read is put aside, and the strictest rule of what is left of
-it is in force until a person makes another.
-
-The trial of a rule, in a small file that is replaced as a whole.
-
-One that cannot be read is put aside: then nothing is tried, and nothing else changes.
+it is in force until a person makes another.  A trial that cannot be read is put aside:
+then nothing is tried, and nothing else changes.
 """
 
 import asyncio
@@ -124,31 +121,31 @@ def _with_settings(
     """
     last, before = versions[-1], _as_set(versions)
     now = {row.name: getattr(settings, row.name) for row in PARAMETERS}
-    new = {name: one for name, one in now.items() if before.get(name) != one}
-    changed = replace(last, **new)
-    if changed == last:
+    new = {name: value for name, value in now.items() if before.get(name) != value}
+    if replace(last, **new) == last:
         return versions
-    changed = replace(
-        changed,
-        version=last.version + 1,
-        comparison=None,
-        author=_SETTINGS,
-        since=wall,
-    )
-    return [*versions, changed]
+    return [*versions, _next(last, _SETTINGS, wall, **new)]
+
+
+def _next(
+    last: DetectionRule, author: str, wall: float, **changes: Any
+) -> DetectionRule:
+    """The version after another; it came of no trial."""
+    changes |= {"comparison": None, "author": author, "since": wall}
+    return replace(last, version=last.version + 1, **changes)
 
 
 def _as_set(versions: list[DetectionRule]) -> dict[str, Any]:
     """The parameters as the settings had them last: each where they changed it last."""
     found = dict[str, Any]()
-    before: DetectionRule | None = None
-    for rule in versions:
+    for before, rule in zip([None, *versions], versions, strict=False):
+        if rule.author != _SETTINGS:
+            continue
         for row in PARAMETERS:
             value = getattr(rule, row.name)
             is_new = before is None or getattr(before, row.name) != value
-            if rule.author == _SETTINGS and (is_new or row.name not in found):
+            if is_new or row.name not in found:
                 found[row.name] = value
-        before = rule
     return found
 
 
@@ -157,16 +154,9 @@ def _with_looks(versions: list[DetectionRule], wall: float) -> list[DetectionRul
     last = versions[-1]
     if last.possible_people:
         return versions
-    changed = replace(
-        last,
-        possible_people=True,
-        version=last.version + 1,
-        comparison=None,
-        # What was recovered stays to be checked.
-        author=RECOVERED if last.author == RECOVERED else UPGRADED,
-        since=wall,
-    )
-    return [*versions, changed]
+    # What was recovered stays to be checked.
+    author = RECOVERED if last.author == RECOVERED else UPGRADED
+    return [*versions, _next(last, author, wall, possible_people=True)]
 
 
 class _StoredRule(BaseModel):
@@ -184,12 +174,12 @@ class _StoredRule(BaseModel):
 
     def rule(self) -> DetectionRule:
         """The version of this line."""
-        told = dict(self)
+        stored = dict(self)
         values: dict[str, Any] = {
-            row.name: row.read(told, row.default, row.name) for row in PARAMETERS
+            row.name: row.read(stored, row.default, row.name) for row in PARAMETERS
         }
-        own: dict[str, Any] = {name: told[name] for name in _StoredRule.model_fields}
-        return DetectionRule(**values, **own)
+        values |= {name: stored[name] for name in _StoredRule.model_fields}
+        return DetectionRule(**values)
 
 
 if TYPE_CHECKING:
@@ -234,7 +224,11 @@ class FileTrials:
         Raises:
             HopError: the disk did not take it.
         """
-        lines = [] if trial is None else [_fields(trial)]
+        lines: list[dict[str, object]] = []
+        if trial is not None:
+            names = _StoredTrial.model_fields
+            fields = {name: getattr(trial, name) for name in names}
+            lines = [{**fields, "rule": rule_fields(trial.rule)}]
         await save_lines(self._path, TRIALS_FORM, lines)
 
 
@@ -253,13 +247,3 @@ class _StoredTrial(BaseModel):
 def _read(line: bytes) -> Trial:
     stored = _StoredTrial.model_validate_json(line)
     return Trial(**{**dict(stored), "rule": stored.rule.rule()})
-
-
-def _fields(trial: Trial) -> dict[str, object]:
-    return {
-        "rule": rule_fields(trial.rule),
-        "by": trial.by,
-        "since": trial.since,
-        "so_far": trial.so_far,
-        "differences": trial.differences,
-    }

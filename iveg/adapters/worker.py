@@ -37,7 +37,7 @@ class Worker:
 
     def __init__(
         self,
-        failed: Callable[[Exception], None] = lambda _: None,
+        failed: Callable[[Exception], None] | None = None,
         limit_s: float = LIMIT_S,
     ) -> None:
         self._failed = failed
@@ -66,23 +66,11 @@ class Worker:
                 self._thread, self._ask, work, args, kwargs
             )
         except HopError as error:
-            if error.hop == _NAME:
+            if error.hop == _NAME and self._failed is not None:
                 self._failed(error)
             raise
         finally:
             self._waiting -= 1
-
-    @property
-    def is_busy(self) -> bool:
-        """Whether somebody waits for an answer."""
-        return self._waiting > 0
-
-    def interrupt(self) -> None:
-        """End the process, whatever it does; the next question has another."""
-        # Whoever waits for it sees its line closed.
-        process = self._process
-        if process is not None:
-            process.kill()
 
     def close(self) -> None:
         """End the process, whatever it does."""

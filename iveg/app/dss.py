@@ -169,13 +169,15 @@ class Dss:
             self.settings.direct_read,
             ingest.is_past,
             self.pipeline.supervision.guard(RECORDINGS, self.stores.inputs.measure),
+            ingest.is_early,
         )
         self.outside.link.attach(
-            reader.subscriptions(),
+            {},
             reader.read,
             self._broker_back,
             self._broker_lost,
             reader.refuse_stored,
+            [*reader.subscriptions().values()],
         )
 
     def _provisioner(self) -> Provisioner:

@@ -3,9 +3,7 @@
 import argparse
 import asyncio
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,13 +21,9 @@ from iveg.cli.running import (
     tune_garbage_collection,
 )
 from iveg.domain.errors import HopError, SettingsError, UnreadableError
-from iveg.domain.feedback import Feedback
 from iveg.domain.fleet import UNDESCRIBED_SPEED, RobotDescription, RobotProfile
-from iveg.domain.geometry import Twist2D
-from iveg.domain.witness import Outline, Plan
+from iveg.domain.witness import Plan
 from iveg.ngsi import names
-from iveg.robot.goals import Navigate
-from iveg.robot.node import NodeSettings, RobotNode
 from iveg.robot.ros2.checking import CheckRow, Traffic, forms_published, judge, lines
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs
@@ -158,46 +152,20 @@ async def _ride(
     with Dds(network, gate=options.id) as dds:
         await refuse_second_gate(dds, config.full_topics["cmd_vel_out"])
         safety = node_settings(settings, data / "robots", _plan(options.greenhouse))
-        node = partial(_node, options.id, settings, safety, config)
-        body = _profile(
-            load_fleet(settings.fleet, settings.robots).of_robot(options.id), config
-        )
+        fleet = load_fleet(settings.fleet, settings.robots)
         robot = Ros2Robot(
             options.id,
             config,
             dds,
-            node,
-            classes=classes,
-            sim_time=options.sim_time,
-            outline=Outline(body.length, body.width),
-            area=None if safety.plan is None else safety.plan.bounds,
+            SensorInputs(config, classes, sim_time=options.sim_time),
+            safety,
+            _profile(fleet.of_robot(options.id), config),
         )
         if options.attended:
             robot.node.release_locally()
         tune_garbage_collection()
         report_ready()
         await robot.run()
-
-
-def _node(
-    robot_id: str,
-    settings: Settings,
-    safety: NodeSettings,
-    config: RobotConfig,
-    drive: Callable[[Twist2D], None],
-    on_feedback: Callable[[str, Feedback], None],
-    navigate: Navigate,
-) -> RobotNode:
-    return RobotNode(
-        robot_id,
-        safety,
-        profile=_profile(
-            load_fleet(settings.fleet, settings.robots).of_robot(robot_id), config
-        ),
-        drive=drive,
-        on_feedback=on_feedback,
-        navigate=navigate,
-    )
 
 
 def _plan(greenhouse: str | None) -> Plan | None:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import uvicorn
-from fastapi import FastAPI
+from starlette.types import ASGIApp
 
 from iveg.adapters.history.engine import history_url, upgrade
 from iveg.app.dss import Dss
@@ -29,6 +29,7 @@ from iveg.domain.errors import HopError
 from iveg.settings import Settings
 from iveg.web.bounded_http import bounded_http
 from iveg.web.live.bounded import BoundedSocket
+from iveg.web.notifications import NotificationsFirst
 
 _log = logging.getLogger(__name__)
 _WS_MAX_BYTES = 65536
@@ -73,7 +74,7 @@ async def serve(
     dss = open_dss(settings, data, demo=demo, make=make)
     with contextlib.suppress(HopError):
         await dss.door.copy_earlier()
-    app = create_app(dss)
+    app = NotificationsFirst(create_app(dss), dss.face.orion)
     config = _config(settings, app)
     server = _Server(
         config,
@@ -107,7 +108,7 @@ def _print_way_in(settings: Settings, dss: Dss) -> None:
         print(invitation_link(settings, invitation), flush=True)
 
 
-def _config(settings: Settings, app: FastAPI) -> uvicorn.Config:
+def _config(settings: Settings, app: ASGIApp) -> uvicorn.Config:
     return uvicorn.Config(
         app,
         host=settings.host,

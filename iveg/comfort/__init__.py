@@ -1,1 +1,1 @@
-"""Parts that people like to have: each may fail by itself, and nothing vital notices."""
+"""What may fail by itself, and nothing vital notices: history, map, messages, goals."""

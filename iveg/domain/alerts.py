@@ -1,28 +1,20 @@
-"""Alerts to people: raised, acknowledged, cleared (ISA-18.2), and what raises them.
-
-Alerts after ISA-18.2: raised, acknowledged, cleared (docs/dashboard.md, "Alerts").
+"""Alerts to people after ISA-18.2: raised, acknowledged, cleared; and their causes.
 
 The conditions that hold are found anew each time; the book compares them with the
-alerts that it keeps.  A condition that ends clears its alert; one that returns is the
-same alert, one occurrence more.  One row stands for all of them, but never for less
-than the gravest unacknowledged occurrence: grouping cannot hide an escalation.
+alerts that it keeps (docs/dashboard.md, "Alerts").  A condition that ends clears its
+alert; one that returns is the same alert, one occurrence more.  One row stands for all
+of them, but never for less than the gravest unacknowledged occurrence: grouping cannot
+hide an escalation.
 
-The alert conditions that hold now, from decisions and robots (docs/dashboard.md).
-
-An alert as the history keeps it, both ways.
-
-Percentiles of few measured values.
-
-Acknowledgement latency: how soon the fleet obeys its speed limits (docs/safety.md).
-
-The time runs from the notification of the detection frame that a slow-down rests on to
-the robot's own report that it applies the factor.  Both are read on the server's clock,
-so no other clock has to be believed.  The way from camera to iVeg is left out: only the
-robot's clock could tell it.
+Last comes the acknowledgement latency: how soon the fleet obeys its speed limits
+(docs/safety.md).  The time runs from the notification of the detection frame that a
+slow-down rests on to the robot's own report that it applies the factor.  Both are read
+on the server's clock, so no other clock has to be believed.  The way from camera to
+iVeg is left out: only the robot's clock could tell it.
 
 A robot judges the feedback by its own pose, and may report a slow-down before iVeg
-finds the robot inside the ring.  It is then timed from the newest frame that the fleet
-had received by then.  A robot that drives into a ring of which no frame is recent
+finds the robot inside the zone.  It is then timed from the newest frame that the fleet
+had received by then.  A robot that drives into a zone of which no frame is recent
 counts as asked and acknowledged, but its time says nothing of the way.  A robot that
 was slow for another reason is not asked.
 """
@@ -116,22 +108,26 @@ class AlertBook:
         self, conditions: Iterable[Condition], now: Instant, new_id: str
     ) -> list[BookedAlert]:
         """Take the conditions that hold now; returns the alerts that they changed."""
-        wrong = _gravest(conditions)
+        wrong: dict[tuple[str, str], Condition] = {}
+        for condition in conditions:
+            known = wrong.setdefault(_key(condition), condition)
+            if condition.priority < known.priority:
+                wrong[_key(condition)] = condition
         changed = []
-        for key, alert in list(self._alerts.items()):
-            if key in wrong or alert.cleared is not None:
-                continue
-            self._alerts[key] = _clear(alert, now)
-            changed.append(self._alerts[key])
+        for key, alert in self._alerts.items():
+            if key not in wrong and alert.cleared is None:
+                ended = replace(alert.last, cleared=now)
+                self._alerts[key] = replace(alert, last=ended)
+                changed.append(self._alerts[key])
         for number, (key, condition) in enumerate(wrong.items()):
             before = self._alerts.get(key)
-            if before is not None and _goes_on(before, condition):
-                # What has not changed stays the very same for whoever draws it.
-                if condition != before.condition:
-                    self._alerts[key] = replace(before, condition=condition)
-                continue
-            self._alerts[key] = _raise(before, condition, now, f"{new_id}-{number}")
-            changed.append(self._alerts[key])
+            if before is None or not _goes_on(before, condition):
+                alert_id = f"{new_id}-{number}"
+                self._alerts[key] = _raise(before, condition, now, alert_id)
+                changed.append(self._alerts[key])
+            elif condition != before.condition:
+                # Else it stays the very same object for whoever draws it.
+                self._alerts[key] = replace(before, condition=condition)
         self._forget(now)
         return changed
 
@@ -140,7 +136,14 @@ class AlertBook:
     ) -> BookedAlert | None:
         """Acknowledge all occurrences; None when there is no such alert."""
         alert = self.find(alert_id)
-        return None if alert is None else self._keep(_see(alert, by, note, now))
+        if alert is None:
+            return None
+        last = alert.last
+        if last.acknowledged is None:
+            last = replace(last, acknowledged=now, acknowledged_by=by, note=note)
+        seen = replace(alert, last=last, unseen=None)
+        self._alerts[_key(alert.condition)] = seen
+        return seen
 
     def remember(self, alerts: Iterable[BookedAlert]) -> None:
         """Take up cleared, unacknowledged alerts of an earlier run; known ones stay.
@@ -148,22 +151,15 @@ class AlertBook:
         If the condition holds again, a new alert of this run already stands beside it.
         """
         for alert in alerts:
-            key = alert.condition.key, alert.condition.subject
-            if key in self._alerts:
+            if _key(alert.condition) in self._alerts:
                 named = replace(alert.condition, subject=alert.alert_id)
                 alert = replace(alert, condition=named)
-                key = named.key, named.subject
-            self._alerts[key] = alert
+            self._alerts[_key(alert.condition)] = alert
 
     def find(self, alert_id: str) -> BookedAlert | None:
         """An alert that is active or recently cleared."""
         found = (one for one in self._alerts.values() if one.alert_id == alert_id)
         return next(found, None)
-
-    def _keep(self, alert: BookedAlert) -> BookedAlert:
-        """Store the new value of an alert."""
-        self._alerts[alert.condition.key, alert.condition.subject] = alert
-        return alert
 
     def _forget(self, now: Instant) -> None:
         for key, alert in list(self._alerts.items()):
@@ -173,23 +169,13 @@ class AlertBook:
                 del self._alerts[key]
 
 
-def _gravest(conditions: Iterable[Condition]) -> dict[tuple[str, str], Condition]:
-    """Conditions by kind and subject; of two alike the graver."""
-    wrong: dict[tuple[str, str], Condition] = {}
-    for one in conditions:
-        known = wrong.setdefault((one.key, one.subject), one)
-        if one.priority < known.priority:
-            wrong[one.key, one.subject] = one
-    return wrong
+def _key(condition: Condition) -> tuple[str, str]:
+    return condition.key, condition.subject
 
 
 def _goes_on(before: BookedAlert, condition: Condition) -> bool:
     """Whether the occurrence continues: a graver one is a new occurrence."""
     return before.cleared is None and condition.priority >= before.condition.priority
-
-
-def _clear(alert: BookedAlert, now: Instant) -> BookedAlert:
-    return replace(alert, last=replace(alert.last, cleared=now))
 
 
 def _raise(
@@ -208,20 +194,13 @@ def _raise(
     )
 
 
-def _see(alert: BookedAlert, by: str, note: str, now: Instant) -> BookedAlert:
-    last = alert.last
-    if last.acknowledged is None:
-        last = replace(last, acknowledged=now, acknowledged_by=by, note=note)
-    return replace(alert, last=last, unseen=None)
-
-
 ESTIMATED_SHOWN_AFTER_S = 5.0
 """Time that a robot may take to receive its first feedback (s)."""
 DETECTOR_STARTS_S = 10.0
 """Time that a fleet may take to send its first detection frames after iVeg's start."""
 SHOWN_S = 10.0
-"""How long after it was last so a condition is reported (s): one at its bound is one
-alert and not one a second."""
+"""Time for which a condition is reported after it last held (s): one at its bound is
+one alert and not one a second."""
 
 
 def of_ignored(robot_id: str, limit: SpeedLimit | None) -> Iterable[Condition]:
@@ -243,10 +222,9 @@ def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
     """A robot that is lost, doubted, or whose clock or detector is off."""
     name = robot.robot_id
     if robot.link(now) == "LOST":
-        if robot.motion(now).moves:
-            yield Condition.of_robot("P1", "alert.moving_robot_lost", name)
-        else:
-            yield Condition.of_robot("P2", "alert.robot_lost", name)
+        moves = robot.motion(now).moves
+        key = "alert.moving_robot_lost" if moves else "alert.robot_lost"
+        yield Condition.of_robot("P1" if moves else "P2", key, name)
     if robot.refused:
         yield Condition.of_robot("P3", "alert.robot_refused", name)
     offset = robot.clock.warning(now, _may_be_late_s(robot, now))
@@ -272,11 +250,10 @@ def of_detector(
         yield Condition.of_robot("P2", "alert.detector_clock", name)
     if _is_silent(robot, now, started):
         yield Condition.of_robot("P2", "alert.detector_silent", name)
-    if detector.blind_by is not None:
-        seer = detector.blind_by
+    if (seer := detector.blind_by) is not None:
         yield Condition.of_robot("P2", "alert.camera_blind", name, by=seer)
-    if detector.out_of_service is not None:
-        out, key = detector.out_of_service, "alert.detector_out_of_service"
+    if (out := detector.out_of_service) is not None:
+        key = "alert.detector_out_of_service"
         yield Condition.of_robot("P3", key, name, by=out.by, reason=out.reason)
 
 
@@ -328,10 +305,10 @@ def _is_silent(robot: RobotState, now: Instant, started: Instant) -> bool:
     detector = robot.detector
     if detector.is_flawed(now) or not detector.is_missing(now):
         return False
-    if robot.link(now) == "LOST":
+    # One that is stamped by another clock speaks.
+    apart_at = robot.clock.detector_apart_at
+    if robot.link(now) == "LOST" or _is_recent(apart_at, now, LIMITS.silence_s):
         return False
-    if _is_recent(robot.clock.detector_apart_at, now, LIMITS.silence_s):
-        return False  # it speaks, by another clock
     if detector.whole_at is not None and robot.pose_at is not None:
         # Else all of it is late or has just come back: the robot itself is reported.
         is_alive = now.mono - (robot.alive_since or now.mono) > LIMITS.silence_s
@@ -362,13 +339,15 @@ def _may_be_late_s(robot: RobotState, now: Instant) -> float:
 
 def of_overload(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:
     """Detectors with more detections than can be judged: one alert names them all."""
-    names = [
-        robot.robot_id
-        for robot in robots
-        if _is_recent(robot.detector.flawed_at.get("overload"), now)
-    ]
-    if names:
-        yield _of_all("P2", "alert.pictures_not_judged", sorted(names))
+    yield from _of_all(
+        "P2",
+        "alert.pictures_not_judged",
+        (
+            one.robot_id
+            for one in robots
+            if _is_recent(one.detector.flawed_at.get("overload"), now)
+        ),
+    )
 
 
 def of_rule(rule: DetectionRule) -> Iterable[Condition]:
@@ -380,31 +359,27 @@ def of_rule(rule: DetectionRule) -> Iterable[Condition]:
 
 def of_fleet(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:
     """Estimated ages, no description, boxes without a frame: one alert each."""
-    fleet = list(robots)
-    estimated = [
-        robot.robot_id
-        for robot in fleet
-        if robot.estimated_since is not None
-        and now.mono - robot.estimated_since > ESTIMATED_SHOWN_AFTER_S
-    ]
-    unlabelled = [
-        one.robot_id
-        for one in fleet
-        if one.unlabelled and one.profile.unlabelled_frame is None
-    ]
-    undescribed = [one.robot_id for one in fleet if not one.description.is_described]
-    for key, names in (
-        ("alert.age_estimated", estimated),
-        ("alert.robots_not_described", undescribed),
-        ("alert.frame_not_named", unlabelled),
-    ):
-        if names:
-            yield _of_all("P3", key, names)
+    names: dict[str, list[str]] = {
+        "alert.age_estimated": [],
+        "alert.robots_not_described": [],
+        "alert.frame_not_named": [],
+    }
+    for robot in robots:
+        since = robot.estimated_since
+        if since is not None and now.mono - since > ESTIMATED_SHOWN_AFTER_S:
+            names["alert.age_estimated"].append(robot.robot_id)
+        if not robot.description.is_described:
+            names["alert.robots_not_described"].append(robot.robot_id)
+        if robot.unlabelled and robot.profile.unlabelled_frame is None:
+            names["alert.frame_not_named"].append(robot.robot_id)
+    for key, found in names.items():
+        yield from _of_all("P3", key, found)
 
 
-def _of_all(priority: Priority, key: str, names: Iterable[str]) -> Condition:
-    """One condition that names every robot concerned."""
-    return Condition(priority, key, "fleet", None, {"robots": ", ".join(names)})
+def _of_all(priority: Priority, key: str, names: Iterable[str]) -> Iterable[Condition]:
+    """One condition that names every robot concerned; none without robots."""
+    if robots := ", ".join(sorted(names)):
+        yield Condition(priority, key, "fleet", None, {"robots": robots})
 
 
 def write_alert(alert: BookedAlert) -> AlertRecord:
@@ -509,8 +484,19 @@ def acknowledgements_of(
     decisions: Iterable[SlowdownDecision], now: Instant
 ) -> Acknowledgements:
     """Acknowledgement latencies of the decisions in memory, last five minutes."""
-    recent = [one for one in decisions if _counts(one, now)]
-    due = [one for one in recent if _is_due(one, now)]
+    recent = [
+        one
+        for one in decisions
+        if now.mono - one.entry.entered.mono <= WINDOW_S
+        # A robot that was slow for something else was not asked; one that braked
+        # ahead of its zone was.
+        and (one.answered is not None or not one.entry.already_slow)
+    ]
+    due = [
+        one
+        for one in recent
+        if now.mono - one.entry.entered.mono > ECHO_S or _is_acknowledged(one)
+    ]
     timed = [one for one in recent if one.took_s is not None]
     took = sorted(one.took_s for one in timed if one.took_s is not None)
     return Acknowledgements(
@@ -525,24 +511,10 @@ def acknowledgements_of(
     )
 
 
-def _counts(decision: SlowdownDecision, now: Instant) -> bool:
-    entry = decision.entry
-    # Who was ahead and has braked by now was not slow for something else.
-    asked = decision.answered is not None or not entry.already_slow
-    return asked and now.mono - entry.entered.mono <= WINDOW_S
-
-
-def _is_due(decision: SlowdownDecision, now: Instant) -> bool:
-    """Whether the time to acknowledge is over."""
-    waited = now.mono - decision.entry.entered.mono
-    return waited > ECHO_S or _is_acknowledged(decision)
-
-
 def _is_acknowledged(decision: SlowdownDecision) -> bool:
     applied, entry = decision.applied, decision.entry
-    return entry.told_before or (
-        applied is not None and applied.mono - entry.entered.mono <= ECHO_S
-    )
+    is_in_time = applied is not None and applied.mono - entry.entered.mono <= ECHO_S
+    return entry.told_before or is_in_time
 
 
 def _age(moments: Iterable[float | None], now: Instant) -> float | None:

@@ -1,23 +1,10 @@
-"""How late a robot's messages are, estimated from its clock (docs/safety.md, "Age").
+"""Delay of a robot's messages, estimated from its clock (docs/safety.md, "Age").
 
 A stamp says how long a message travelled, relative to the fastest one of the same boot
-and transport within a minute (the minimum filter of NTP).  Seen from one side a delay
-that stays the same and a clock that is off look alike, so this is an estimate: it
-serves robots that do not echo, and the display of the offset.
-
-A delay lets no stamp fall: a slow transport is never taken for a clock that was set.
-A detector may stamp by a clock of its own (simulation time, another zone).  Its frames
-are compared with the odometry that came last: farther apart than any frame protects,
-they are of another clock, and their age is unknown.
-Moments are iVeg's monotonic clock, which nobody sets.
-
-The fastest message of the last minute, of one transport and one boot.
-
-::
-
-    stamps fall while seq rises, or  ──> unknown until five    ──> a new filter
-    a message beats the fastest by       messages agree            begins
-    more than half a second
+and transport within a minute (the minimum filter of NTP).  A constant delay and a wrong
+clock look alike from one side, so this is an estimate.  It serves robots that do not
+echo, and the display of the offset.  Moments are iVeg's monotonic clock, which nobody
+sets.
 """
 
 from collections import deque
@@ -32,7 +19,7 @@ _BUCKET_S, _BUCKETS = 5.0, 12
 STEP_S = 0.5
 """A clock that leaps by less is corrected within a minute, unnoticed."""
 AGREE = 5
-"""So many messages of one transport and boot must agree before a leap is believed."""
+"""Messages of one transport and boot that must agree before a leap is believed."""
 
 Kind = type
 Place = tuple[int | None, float]
@@ -40,7 +27,15 @@ Place = tuple[int | None, float]
 
 @dataclass(slots=True)
 class ClockFilter:
-    """The fastest message of the last minute, of one transport and one boot."""
+    """The fastest message of the last minute, of one transport and one boot.
+
+    A delay lets no stamp fall: a slow transport is never taken for a clock that was
+    set::
+
+        stamps fall while seq rises, or  ──> unknown until five    ──> a new filter
+        a message beats the fastest by       messages agree            begins
+        more than half a second
+    """
 
     _buckets: deque[tuple[float, float]] = field(
         default_factory=lambda: deque(maxlen=_BUCKETS)
@@ -52,7 +47,7 @@ class ClockFilter:
     least: float | None = None
     """Arrival less stamp of the fastest message (s); None before the first."""
     newest: float | None = None
-    """The same of the newest one."""
+    """Arrival less stamp of the newest message (s)."""
 
     def observe(self, kind: Kind, origin: Origin, now: float) -> float | None:
         """Take one message in; ``kind`` says whose count its ``seq`` belongs to.
@@ -137,6 +132,10 @@ _Sender = tuple[TransportId, str | None, bool]
 class RobotClock:
     """All that is estimated of one robot's clock: a filter a transport and boot.
 
+    A detector may stamp by a clock of its own (simulation time, another zone).  Its
+    frames are compared with the odometry that came last: farther apart than any frame
+    protects, they are of another clock, and their age is unknown.
+
     Attributes:
         detector_apart_at: When a detection frame was last stamped by another clock than
             odometry (monotonic, s).
@@ -158,7 +157,7 @@ class RobotClock:
         transport: TransportId,
         lag: float | None,
     ) -> float | None:
-        """How old a message was when it arrived (s), estimated; None unknown.
+        """Age of a message when it arrived (s), estimated; None: unknown.
 
         ``lag`` (s) is that of iVeg's own probe through FIWARE, None before one came
         back: what FIWARE alone brings is never younger.
@@ -193,7 +192,7 @@ class RobotClock:
     def _beyond_odometry(
         self, transport: TransportId, origin: Origin, now: float
     ) -> float | None:
-        """What a detection frame took beyond the fastest odometry (s), 0 if unknown.
+        """Delay of a detection frame beyond the fastest odometry (s), 0 if unknown.
 
         None where it is stamped by another clock.
         """
@@ -201,7 +200,7 @@ class RobotClock:
         if odometry is None or odometry.newest is None or origin.stamp_s is None:
             return 0.0
         transit = now - origin.stamp_s
-        if abs(transit - odometry.newest) > LIMITS.ring_lasts_s:
+        if abs(transit - odometry.newest) > LIMITS.zone_lasts_s:
             return None
         return max(
             0.0, transit - (transit if odometry.least is None else odometry.least)
@@ -252,7 +251,7 @@ class RobotClock:
                 yield boot, one
 
     def offset_s(self, now: Instant) -> float | None:
-        """How far the robot's clock is behind ours (s), by direct messages alone."""
+        """Lag of the robot's clock behind ours (s), by direct messages alone."""
         direct = (one for _, one in self._direct())
         newest = max(direct, key=lambda one: one.seen_at, default=None)
         if newest is None or newest.least is None:

@@ -1,22 +1,18 @@
-"""The shared costmap: obstacles that lasers found, with the rings of people laid over.
+"""The shared costmap: obstacles that lasers found, with the zones of people laid over.
 
 Every scan judges each cell in its reach, free or taken (Moravec and Elfes' occupancy
 grid, in log-odds with the clamps of OctoMap, so that a crate that is carried away is
 soon forgotten).  Cells that no beam reaches any more fade to unknown.  People and peers
-are laid over the grid with their ring at the moment of the request.
+are laid over the grid with their zone at the moment of the request.
 
-A grid over ``map``: where its cells lie.
-
-The area to map where a greenhouse has no walls: around its robots.
-
-What one scan says of each cell in its reach.
-
-A cell is free if the beam in that direction went further, taken if it ended there.
-Left out: beams are lines without width, and come from the nearest quarter of a cell.
+A ``Grid`` says where the cells lie, a ``Sweep`` what one scan says of those in its
+reach: a cell is free if the beam in that direction went further, taken if it ended
+there.  Left out: beams are lines without width, and come from the nearest quarter of a
+cell.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -59,6 +55,13 @@ class Grid:
         width, height = (max(1, math.floor(s / side + 1e-9)) for s in (wide, high))
         return cls(side, area.xmin, area.ymin, width, height)
 
+    @property
+    def area(self) -> Rectangle:
+        """All cells together, in ``map``."""
+        east = self.xmin + self.width * self.resolution
+        north = self.ymin + self.height * self.resolution
+        return Rectangle(self.xmin, self.ymin, east, north)
+
     def window(self, x: float, y: float, reach: float) -> Cells:
         """The cells within ``reach`` (m) of a point along both axes."""
         low = self.index(x - reach, y - reach)
@@ -94,32 +97,23 @@ def overlap(start: int, size: int, limit: int) -> slice:
 _WINDOW_M, _WINDOW_MARGIN_M, _WINDOW_EDGE_M = 60.0, 20.0, 8.0
 
 
-def window_round(poses: Iterable[Pose2D], before: Grid | None) -> Grid | None:
+def window_round(poses: Sequence[Pose2D], before: Grid | None) -> Grid | None:
     """The area to map when there are no walls: around the robots, at most 60 m wide.
 
     The window stays in place while every robot is well inside; None without robots.
     """
-    places = [(pose.x, pose.y) for pose in poses]
-    if not places:
+    x, y = [pose.x for pose in poses], [pose.y for pose in poses]
+    if not x:
         return before
-    x, y = zip(*places, strict=True)
-    box = Rectangle(min(x), min(y), max(x), max(y))
-    if before is not None and _holds(before, box):
-        return before
-    sides = (box.xmin, box.xmax), (box.ymin, box.ymax)
-    (west, east), (south, north) = (_stretch(*side) for side in sides)
+    west, east, south, north = min(x), max(x), min(y), max(y)
+    if before is not None:
+        area, inwards = before.area, -_WINDOW_EDGE_M
+        holds_both = area.contains(west, south, inwards)
+        if holds_both and area.contains(east, north, inwards):
+            return before
+    west, east = _stretch(west, east)
+    south, north = _stretch(south, north)
     return Grid.over(Rectangle(west, south, east, north))
-
-
-def _holds(grid: Grid, box: Rectangle) -> bool:
-    xmax = grid.xmin + grid.width * grid.resolution
-    ymax = grid.ymin + grid.height * grid.resolution
-    return (
-        grid.xmin + _WINDOW_EDGE_M <= box.xmin
-        and grid.ymin + _WINDOW_EDGE_M <= box.ymin
-        and box.xmax <= xmax - _WINDOW_EDGE_M
-        and box.ymax <= ymax - _WINDOW_EDGE_M
-    )
 
 
 def _stretch(low: float, high: float) -> tuple[float, float]:
@@ -131,7 +125,7 @@ def _stretch(low: float, high: float) -> tuple[float, float]:
 
 _HIT, _MISS = 0.85, -0.4
 _PARTS = 4
-"""Of a cell along each axis: places that a sensor may have, each worked out once."""
+"""Places of a sensor in a cell along each axis, each worked out once."""
 _REACH_M = 15.0
 
 
@@ -161,34 +155,32 @@ def sweep_of(
     reach = min(scan.range_max, _REACH_M)
     row, column = grid.index(sensor.x, sensor.y)
     around = math.ceil(reach / grid.resolution)
-    cells = (
-        overlap(row - around, 2 * around + 1, grid.height),
-        overlap(column - around, 2 * around + 1, grid.width),
-    )
-    shape = cells[0].stop - cells[0].start, cells[1].stop - cells[1].start
+    first_row, first_column = row - around, column - around
+    rows = overlap(first_row, 2 * around + 1, grid.height)
+    columns = overlap(first_column, 2 * around + 1, grid.width)
+    shape = rows.stop - rows.start, columns.stop - columns.start
     change = np.zeros(shape, np.float32)
     if change.size and scan.ranges.size:
         distance, bearing = _seen_from(grid, sensor, around)
         part = (
-            slice(cells[0].start - row + around, cells[0].stop - row + around),
-            slice(cells[1].start - column + around, cells[1].stop - column + around),
+            slice(rows.start - first_row, rows.stop - first_row),
+            slice(columns.start - first_column, columns.stop - first_column),
         )
         free_to = _free_to(scan, sensor.yaw, bearing[part], reach)
         free = distance[part] < free_to - np.float32(grid.resolution)
         np.multiply(free, np.float32(_MISS), out=change)
         points = scan.points(pose) if returns is None else returns
-        rows, columns = _hits(points, sensor, grid, reach)
-        inside = (rows >= cells[0].start) & (rows < cells[0].stop)
-        inside &= (columns >= cells[1].start) & (columns < cells[1].stop)
-        change[rows[inside] - cells[0].start, columns[inside] - cells[1].start] = _HIT
-    return Sweep(cells, change)
+        hit = _hits(points, sensor, grid, reach) - (rows.start, columns.start)
+        hit = hit[((hit >= 0) & (hit < shape)).all(axis=1)]
+        change[hit[:, 0], hit[:, 1]] = _HIT
+    return Sweep((rows, columns), change)
 
 
 def _seen_from(grid: Grid, sensor: Pose2D, around: int) -> tuple[Numbers, Numbers]:
     """Distances (m) and bearings (rad) of the cells around a sensor, about exactly."""
     x = (sensor.x - grid.xmin) / grid.resolution
     y = (sensor.y - grid.ymin) / grid.resolution
-    parts = (math.floor((one - math.floor(one)) * _PARTS) for one in (x, y))
+    parts = (math.floor((place - math.floor(place)) * _PARTS) for place in (x, y))
     return _cells_around(grid.resolution, around, *parts)
 
 
@@ -225,7 +217,7 @@ def _free_to(scan: LaserScan, yaw: float, bearing: Numbers, reach: float) -> Num
 
 
 def _lengths(scan: LaserScan, size: int, reach: float) -> Numbers:
-    """How far each beam of a turn went (m); 0 where there is none, or no use in it."""
+    """Length of each beam of a turn (m); 0 where there is none, or no use in it."""
     ranges, count = scan.ranges, scan.ranges.size
     went = np.where(scan.speaks(), np.minimum(ranges, reach), 0.0).astype(np.float32)
     if abs(count * scan.angle_increment) >= math.tau - 1.5 * abs(scan.angle_increment):
@@ -237,13 +229,12 @@ def _lengths(scan: LaserScan, size: int, reach: float) -> Numbers:
 
 def _hits(
     points: Numbers, sensor: Pose2D, grid: Grid, reach: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    points = points.astype(np.float64)
-    near = np.hypot(points[:, 0] - sensor.x, points[:, 1] - sensor.y) <= reach
-    points = points[near]
-    column = np.floor((points[:, 0] - grid.xmin) / grid.resolution).astype(np.int64)
-    row = np.floor((points[:, 1] - grid.ymin) / grid.resolution).astype(np.int64)
-    return row, column
+) -> NDArray[np.int64]:
+    """Row and column of each return within reach, shape (n, 2)."""
+    x, y = points.astype(np.float64).T
+    near = np.hypot(x - sensor.x, y - sensor.y) <= reach
+    places = np.column_stack((y[near] - grid.ymin, x[near] - grid.xmin))
+    return np.floor(places / grid.resolution).astype(np.int64)
 
 
 UNKNOWN = -1
@@ -256,7 +247,7 @@ _RING_EDGE, _RING_CENTRE = 50, 99
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InflatedGrid:
-    """Costs at one moment: ``nav_msgs/OccupancyGrid`` with its rings inflated.
+    """Costs at one moment: ``nav_msgs/OccupancyGrid`` with its zones inflated.
 
     Attributes:
         data: Shape (height, width), int8; 0 free to 100 taken, -1 unknown.
@@ -295,7 +286,7 @@ class Occupancy:
         self._faded = mono
 
     def moved_to(self, grid: Grid) -> "Occupancy":
-        """The same knowledge on a grid of the same resolution that lies elsewhere."""
+        """A copy on a grid of the same resolution that lies elsewhere."""
         other = Occupancy(grid, self._half_life_s)
         other._faded = self._faded
         old = self.grid
@@ -310,7 +301,7 @@ class Occupancy:
         return other
 
     def costs(self, zones: Iterable[Zone] = ()) -> InflatedGrid:
-        """What each cell costs, rings of people and peers laid over it."""
+        """Cost of each cell, zones of people and peers laid over it."""
         cost = np.clip(self._log * (100.0 / _MOST), 0.0, 100.0).astype(np.int8)
         cost[np.abs(self._log) < _KNOWN] = UNKNOWN
         for zone in zones:
@@ -321,7 +312,7 @@ class Occupancy:
 def inflate(
     cost: NDArray[np.int8], grid: Grid, x: float, y: float, radius_m: float
 ) -> None:
-    """Lay one ring over the costs: dear at its edge, dearest at its centre."""
+    """Lay one zone over the costs: dear at its edge, dearest at its centre."""
     cells = grid.window(x, y, radius_m)
     dx, dy = grid.offsets(cells, x, y)
     inward = 1.0 - np.hypot(dx, dy) / np.float32(radius_m)

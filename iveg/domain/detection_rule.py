@@ -87,7 +87,7 @@ class DetectionRule(Parameters):
         return None if meaning == "harmless" else meaning
 
     def also_naming(self, people: Iterable[str]) -> "DetectionRule":
-        """The same rule, to which these plain words are people, too."""
+        """Copy of the rule for which these plain words are people, too."""
         named: dict[str, Class] = dict.fromkeys(people, "person")
         return replace(self, aliases={**self.aliases, **named}) if named else self
 

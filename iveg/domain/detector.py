@@ -1,4 +1,4 @@
-"""What is known of one robot's detector: whether its pictures are read whole.
+"""Evidence of one robot's detector: whether its pictures are read whole.
 
 Silence, a refused frame and a healthy empty aisle must never look alike, so only one
 thing proves that a detector works::
@@ -20,11 +20,11 @@ from iveg.domain.observations import Detection, DetectionFrame, Instant
 from iveg.domain.words import HeardWords
 
 CLASS_NAMES = 200
-"""So many different classes of one robot have a name; every further one is "other"."""
+"""Classes of one robot that keep their name; every further one is "other"."""
 OTHER = "other"
 _MOST_NAMES = 4
 FRAMES_HZ = 45.0
-"""Of one robot, in the mean of a second; the contract's rate is 30 Hz."""
+"""Most frames of a robot in the mean of a second; the contract's rate is 30 Hz."""
 
 Flaw = Literal["unreadable", "overload", "unplaced", "strange", "blind"]
 """Why a frame was not read whole: it or a box of a person or robot was refused, more
@@ -101,7 +101,7 @@ class DetectorEvidence:
     _counted_at: float | None = None
 
     def words_of(self, name: str) -> HeardWords:
-        """What was heard of a detector of this name, which is now the newest."""
+        """Words heard of a detector of this name, which is now the newest."""
         self.words[name] = self.words.pop(name, HeardWords())
         if len(self.words) > _MOST_NAMES:
             del self.words[next(iter(self.words))]

@@ -73,7 +73,7 @@ class Tile:
 
 @dataclass(slots=True)
 class TileStatus:
-    """What is known of one tile.
+    """Newest knowledge of one tile.
 
     Attributes:
         value: The newest number; None before the first.
@@ -109,7 +109,7 @@ class Equipment:
         return frozenset((one.entity_id, one.entity_type) for one in self.tiles)
 
     def status(self, tile: Tile) -> TileStatus:
-        """What is known of a tile."""
+        """Newest knowledge of a tile."""
         return self._status[tile.key]
 
     def read(
@@ -148,30 +148,21 @@ class Equipment:
         return status.beyond or "ok"
 
     def conditions(self, now: Instant) -> Iterator[Condition]:
-        """What is wrong with tiles now."""
+        """Conditions of tiles that are silent, unreadable or beyond a limit."""
         for tile in self.tiles:
             state, beyond = self.state(tile, now), self._status[tile.key].beyond
+            slots: dict[str, Slot] = {"tile": tile.key}
+            slots |= {f"tile_{language}": name for language, name in tile.name.items()}
             if state in ("silent", "unreadable"):
-                minutes = round(tile.silent_after_s / 60.0, 1)
-                slots = _slots(tile, minutes=minutes)
+                slots["minutes"] = round(tile.silent_after_s / 60.0, 1)
                 yield Condition("P3", f"alert.tile_{state}", tile.key, None, slots)
             elif state == beyond and beyond is not None:
                 # The limit and not the value: the sentence stays true while it lasts.
-                unit, limit = shown_unit(tile.unit), tile.limits[beyond]
-                slots = _slots(tile, limit=limit, unit=unit)
+                slots["limit"] = tile.limits[beyond]
+                slots["unit"] = "" if tile.unit == "1" else tile.unit
                 key = f"alert.tile_{'high' if 'high' in beyond else 'low'}"
                 subject = f"{tile.key} {beyond}"
                 yield Condition(_PRIORITY[beyond], key, subject, None, slots)
-
-
-def _slots(tile: Tile, **more: Slot) -> dict[str, Slot]:
-    names = {"tile_es": tile.name["es"], "tile_en": tile.name["en"]}
-    return {"tile": tile.key, **names, **more}
-
-
-def shown_unit(unit: str) -> str:
-    """A unit as people read it after a number; of a plain number nothing."""
-    return "" if unit == "1" else unit
 
 
 def contradiction(tiles: Sequence[Tile]) -> tuple[int, str, str] | None:

@@ -1,20 +1,25 @@
-"""The one error tree.
+"""The one error tree; ``web/problems`` makes HTTP of it, and adds what only HTTP has.
 
 IvegError
 ├── SettingsError           a setting that cannot be used; stops the start
 ├── DataFileError           a greenhouse, scenario or log file that cannot be used
 ├── MissingExtraError       a library that was not installed; stops the command
 ├── UnreadableError         bytes that the contract does not describe (HTTP 400)
+├── NotAllowedError         somebody without the role (HTTP 403)
 ├── UnknownRobotError       a robot id that is not in the fleet (HTTP 404)
 ├── UnknownNameError        an id of anything else that is not known (HTTP 404)
-├── MarkRefusedError        a mark "not a person here" on somebody (HTTP 409)
-├── CommandRefusedError     a release or resume that must not happen (HTTP 409)
+├── NotRecordedError        a moment of which nothing was recorded (HTTP 404)
+├── RefusedError            an act that must not happen now (HTTP 409)
+│   ├── CommandRefusedError     a release, resume or goal
+│   ├── MarkRefusedError        a mark "not a person here"
+│   └── TrialRefusedError       beginning, ending or promoting the trial of a rule
 ├── OutdatedError           a change of something that has changed since (HTTP 409)
+├── ProvidedAccountError    a change of what the identity provider says (HTTP 409)
+├── NameTakenError          a name that somebody has already (HTTP 409)
+├── NotANameError           a name that nobody may have
 ├── VersionMissingError     a change that does not say of what (HTTP 428)
 ├── BusyError               more sign-ins wait than are served soon (HTTP 429)
-├── NotAllowedError         somebody without the role (HTTP 403)
 ├── SignOnError             a sign-in at the identity provider that let nobody in
-├── ProvidedAccountError    a change of what the identity provider says (HTTP 409)
 ├── VitalPartError          a part that STOP needs has ended; ends the process
 └── HopError                a neighbour that cannot be reached or answered wrongly
     └── NoAnswerError       one that took the question and did not answer in time
@@ -94,11 +99,11 @@ class NotANameError(IvegError):
     """Nobody may be called so."""
 
     def __init__(self, name: str) -> None:
-        said = (
+        rule = (
             "1 to 64 visible characters, none of < > \" ' = ; ( ), and nobody "
             "else's, such as console, program or operator"
         )
-        super().__init__(f"{name!r} cannot be a name: it must be {said}.")
+        super().__init__(f"{name!r} cannot be a name: it must be {rule}.")
 
 
 class NameTakenError(IvegError):
@@ -108,30 +113,49 @@ class NameTakenError(IvegError):
         super().__init__(f"Somebody is called {name!r} already.")
 
 
-class MarkRefusedError(IvegError):
-    """Nothing may be marked as "not a person here" there.
+class RefusedError(IvegError):
+    """An act is refused now; STOP never is.
 
     Attributes:
-        why: ``somebody`` or ``too_many``.
+        why: Stable code of the reason.
     """
 
-    def __init__(self, why: str) -> None:
-        super().__init__(f"It may not be marked as no person: {why}.")
+    def __init__(self, why: str, sentence: str) -> None:
+        super().__init__(sentence)
         self.why = why
 
 
-class CommandRefusedError(IvegError):
-    """A release, resume or goal is refused; STOP never is.
+class CommandRefusedError(RefusedError):
+    """A release, resume or goal is refused.
 
     Args:
         why: Code of the reason, and what is told unless a sentence is (``because``).
     """
 
     def __init__(
-        self, robot_id: str, asked: str, why: str, because: str | None = None
+        self, robot_id: str, order: str, why: str, because: str | None = None
     ) -> None:
-        super().__init__(f"{asked} of {robot_id} refused: {because or why}.")
-        self.why = why
+        super().__init__(why, f"{order} of {robot_id} refused: {because or why}.")
+
+
+class MarkRefusedError(RefusedError):
+    """Nothing may be marked as "not a person here" there.
+
+    ``why`` is ``somebody`` or ``too_many``.
+    """
+
+    def __init__(self, why: str) -> None:
+        super().__init__(why, f"It may not be marked as no person: {why}.")
+
+
+class TrialRefusedError(RefusedError):
+    """No trial of a rule may begin, end or be promoted now.
+
+    ``why`` is ``running`` (another is), ``same`` (as the rule in force) or ``none``.
+    """
+
+    def __init__(self, why: str) -> None:
+        super().__init__(why, f"That is not possible with the trial of a rule: {why}.")
 
 
 class OutdatedError(IvegError):
@@ -146,18 +170,6 @@ class VersionMissingError(IvegError):
 
     def __init__(self, what: str) -> None:
         super().__init__(f"{what} is changed by naming the version that was seen.")
-
-
-class TrialRefusedError(IvegError):
-    """No trial of a rule may begin, end or be promoted now.
-
-    Attributes:
-        why: ``running`` (another is), ``same`` (as the rule in force) or ``none``.
-    """
-
-    def __init__(self, why: str) -> None:
-        super().__init__(f"That is not possible with the trial of a rule: {why}.")
-        self.why = why
 
 
 class BusyError(IvegError):

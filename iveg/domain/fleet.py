@@ -118,7 +118,7 @@ class FleetDescription:
 
     @property
     def ids(self) -> tuple[str, ...]:
-        """Of all robots."""
+        """Ids of all robots."""
         return tuple(self.members)
 
     def of_robot(self, robot_id: str) -> RobotDescription:

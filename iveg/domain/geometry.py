@@ -125,7 +125,7 @@ class Rectangle:
         )
 
     def farthest_m(self, x: float, y: float) -> float:
-        """How far its farthest corner is from a spot (m)."""
+        """Distance of its farthest corner from a spot (m)."""
         return math.hypot(
             max(x - self.xmin, self.xmax - x), max(y - self.ymin, self.ymax - y)
         )

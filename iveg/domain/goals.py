@@ -1,14 +1,8 @@
 """Goals that people give to robots, below STOP in every respect (docs/safety.md).
 
-What a robot is told of a goal (docs/interfaces/commands.md).
-
-Why a goal is refused: the codes of the contract, and one sentence of each.
-
-Where a goal may be: in the greenhouse, and in no plant, post or crate.
-
-The life of one goal as a table: state × event → new state.
-
-::
+A goal lies in the greenhouse, and in no plant, post or crate; ``REASONS`` has the codes
+of the contract (docs/interfaces/commands.md) for a goal that is refused.  Its life is a
+table: state × event → new state. ::
 
     SENT ──accepted──> DRIVING ──reached──> REACHED      SENT ──refused──> REFUSED
       └──expired──> UNCONFIRMED: nobody sends it again, and a late word still counts
@@ -17,8 +11,6 @@ The life of one goal as a table: state × event → new state.
     every open state ──held──> DELETED        every open state ──replaced──> REPLACED
 
 A pair without a row changes nothing: what has ended stays ended.
-
-Whether a robot may be given a goal now, by all that iVeg knows of it.
 """
 
 from collections.abc import Iterator, Mapping
@@ -33,24 +25,6 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, SafetyReport
 from iveg.domain.robot_state import RobotState
 from iveg.domain.transports import TransportId
-
-__all__ = [
-    "ANSWERED_WITHIN_S",
-    "OPEN_STATES",
-    "REASONS",
-    "CancelOrder",
-    "FollowedGoal",
-    "Goal",
-    "GoalEvent",
-    "GoalKind",
-    "GoalOrder",
-    "GoalState",
-    "GoalWish",
-    "permit",
-    "place_of",
-    "refusal",
-]
-
 
 GoalKind = Literal["here", "aisle", "return", "pause"]
 
@@ -117,7 +91,7 @@ _STEP_M = 0.25
 
 @dataclass(frozen=True, slots=True)
 class GoalWish:
-    """What a person asked for.
+    """A person's wish.
 
     Attributes:
         x: Of ``here``, in ``map`` (m); ``y`` too.
@@ -147,26 +121,23 @@ def place_of(
         start: Where it belongs; None where nobody knows.
     """
     keep_off_m = profile.width / 2
+    place = wish.x, wish.y
     match wish.kind:
         case "pause":
             return pose.x, pose.y
         case "return":
-            place = None if start is None else (start.x, start.y)
+            if start is None:
+                return "no_start"
+            place = start.x, start.y
         case "aisle":
             lanes = (one for one in greenhouse.lanes if one.label == wish.aisle)
             lane = next(lanes, None)
             if lane is None:
                 return "no_such_aisle"
-            free = (
-                one
-                for one in _from_the_middle(lane.area)
-                if _obstructed(greenhouse, *one, keep_off_m) is None
-            )
-            place = next(free, None)
-        case "here":
-            place = wish.x, wish.y
-    if place is None:
-        return "no_start" if wish.kind == "return" else "obstacle"
+            for place in _from_the_middle(lane.area):
+                if _obstructed(greenhouse, *place, keep_off_m) is None:
+                    return place
+            return "obstacle"
     return _obstructed(greenhouse, *place, keep_off_m) or place
 
 
@@ -242,7 +213,7 @@ class FollowedGoal:
     """One goal from a person's wish to its end.
 
     Attributes:
-        by: Who gave it.
+        by: The person who gave it.
         sent: When; ``answered``: the robot's first word; ``ended``: its last change.
         asked: When the robot was last asked something: goal or cancellation.
         why: Code of the robot's refusal.

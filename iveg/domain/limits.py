@@ -31,26 +31,26 @@ class SafetyLimits:
     detection_threshold: float = _limit(
         0.80, "share", "paper, Algorithm 2", "least confidence that raises an alert"
     )
-    ring_default_m: float = _limit(
-        2.0, "m", "paper, Algorithm 3", "ring of a fresh sighting, unless the rule says"
+    zone_default_m: float = _limit(
+        2.0, "m", "paper, Algorithm 3", "zone of a fresh sighting, unless the rule says"
     )
-    ring_least_m: float = _limit(
-        0.5, "m", "chosen: half a robot's length", "least ring that a rule may ask for"
+    zone_least_m: float = _limit(
+        0.5, "m", "chosen: half a robot's length", "least zone that a rule may ask for"
     )
-    ring_most_m: float = _limit(
-        6.0, "m", "chosen: seen 2.8 s ago", "widest ring, asked for or grown"
+    zone_most_m: float = _limit(
+        6.0, "m", "chosen: seen 2.8 s ago", "widest zone, asked for or grown"
     )
     walking_m_s: float = _limit(
-        1.6, "m/s", "ISO 13855", "how fast a person may walk, and a ring grow"
+        1.6, "m/s", "ISO 13855", "how fast a person may walk, and a zone grow"
     )
     growth_grace_s: float = _limit(
-        0.32, "s", "paper, P95 to the broker", "age up to which a ring keeps its size"
+        0.32, "s", "paper, P95 to the broker", "age up to which a zone keeps its size"
     )
     slow_factor: float = _limit(
-        0.5, "share", "paper, Algorithm 3", "speed inside a ring"
+        0.5, "share", "paper, Algorithm 3", "speed inside a zone"
     )
     release_beyond_m: float = _limit(
-        0.3, "m", "chosen: noise of poses", "so far outside the ring a robot is let go"
+        0.3, "m", "chosen: noise of poses", "so far outside the zone a robot is let go"
     )
     release_after_s: float = _limit(
         1.0, "s", "chosen: noise of poses", "and so long after; also on the robot"
@@ -77,8 +77,8 @@ class SafetyLimits:
         3.0, "s", "Spot 3 s", "age of feedback that stops a robot"
     )
     seen_s: float = _limit(1.0, "s", "chosen", "age up to which one is seen")
-    ring_lasts_s: float = _limit(
-        10.0, "s", "chosen", "age up to which a sighting has a ring"
+    zone_lasts_s: float = _limit(
+        10.0, "s", "chosen", "age up to which a sighting has a zone"
     )
     last_seen_s: float = _limit(
         600.0, "s", "chosen", "age up to which a mark stays on the map"
@@ -175,12 +175,12 @@ def grown_radius(
     least: Callable[..., Any] = min,
     most: Callable[..., Any] = max,
 ) -> _OneOrMany:
-    """How wide the ring of a sighting is that is ``age_s`` old (m).
+    """Radius of the zone of a sighting that is ``age_s`` old (m).
 
     It keeps its size for as long as a healthy way takes, grows as fast as a person
     walks, and never shrinks.  ``numpy.minimum`` and ``numpy.maximum`` as ``least`` and
     ``most`` judge an array of ages.
     """
     walked = LIMITS.walking_m_s * most(0.0, age_s - LIMITS.growth_grace_s)
-    grown: _OneOrMany = most(radius_m, least(LIMITS.ring_most_m, radius_m + walked))
+    grown: _OneOrMany = most(radius_m, least(LIMITS.zone_most_m, radius_m + walked))
     return grown

@@ -15,7 +15,6 @@ through a light curtain here.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -24,15 +23,13 @@ from numpy.typing import NDArray
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Odometry
 from iveg.domain.robot_state import RobotState
-from iveg.domain.tracking.person import Sighting, TrackedPerson
+from iveg.domain.tracking.person import TrackedPerson
 
 Band = Literal["clear", "tight", "inside", "unknown"]
 
 _Floats = NDArray[np.float64]
-_Placed = tuple[RobotState, Odometry, float]
-"""A robot, its newest odometry, and the age of that (s)."""
-_UNKNOWN_M = 1e4
-_INSIDE_M = 1e6
+_UNKNOWN_M, _INSIDE_M = 1e4, 1e6
+"""Taken off the rank of unknown and of negative margins, which come first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,51 +94,65 @@ class LeastMargins:
         people: Iterable[TrackedPerson],
         now: Instant,
     ) -> None:
-        self._robots: list[_Placed] = []
+        facts = []
+        self._robots: list[RobotState] = []
         for robot in robots:
-            age = robot.age_s(now)
-            if robot.odometry is not None and age is not None:
-                self._robots.append((robot, robot.odometry, age))
+            age_s = robot.age_s(now)
+            if robot.odometry is not None and age_s is not None:
+                self._robots.append(robot)
+                facts.append(_facts(robot, robot.odometry, age_s))
         seen = [
-            (person.person_id, look)
+            (person.person_id, (look.x, look.y, look.age_s(now)))
             for person in people
             for look in person.sightings
-            if look.age_s(now) <= LIMITS.ring_lasts_s
+            if look.age_s(now) <= LIMITS.zone_lasts_s
         ]
         self._persons = [person_id for person_id, _ in seen]
-        self._row = {one.robot_id: row for row, (one, *_) in enumerate(self._robots)}
-        self._columns: dict[str, list[int]] = {}
-        for column, person_id in enumerate(self._persons):
-            self._columns.setdefault(person_id, []).append(column)
-        self._pairs = _Pairs.of(self._robots, [look for _, look in seen], now)
+        placed = np.array(facts, float).reshape(-1, 6)
+        looks = np.array([look for _, look in seen], float).reshape(-1, 3)
+        self._compute(placed.T[:, :, np.newaxis], looks.T)
+
+    def _compute(self, placed: _Floats, looks: _Floats) -> None:
+        """Terms of all pairs, each of shape (robots, looks), in metres and seconds."""
+        x, y, speed, brakes, half, pose_age = placed
+        to_x, to_y, look_age = looks
+        age = np.maximum(pose_age, look_age)
+        reacts_s = np.maximum(LIMITS.reaction_s, age + LIMITS.onward_s)
+        gap = np.hypot(x - to_x, y - to_y) - half - LIMITS.person_radius_m
+        walks = LIMITS.walking_m_s * (reacts_s + speed / brakes)
+        reaction = speed * reacts_s
+        braking = np.broadcast_to(speed * speed / (2 * brakes), gap.shape)
+        margin = gap - (walks + reaction + braking + LIMITS.uncertainty_m)
+        # Of a far person the least possible margin is known, however old the look.
+        is_far = margin >= LIMITS.margin_clear_m
+        is_seen = look_age <= LIMITS.pose_lost_s
+        self._known = (pose_age <= LIMITS.pose_lost_s) & (is_seen | is_far)
+        is_inside = self._known & (margin < 0.0)
+        self._rank = margin - _UNKNOWN_M * ~self._known - _INSIDE_M * is_inside
+        self._terms = gap, walks, reaction, braking, age
 
     def of_robot(self, robot_id: str) -> SafetyMargin | None:
         """The least margin of this robot to anybody."""
-        row = self._row.get(robot_id)
-        if row is None or not self._persons:
-            return None
-        return self._pair(row, int(np.argmin(self._pairs.rank[row])))
+        rows = [n for n, one in enumerate(self._robots) if one.robot_id == robot_id]
+        return self._least(rows, range(len(self._persons)))
 
     def of_person(self, person_id: str) -> SafetyMargin | None:
         """The least margin of any robot to this person."""
-        columns = self._columns.get(person_id)
-        if columns is None or not self._robots:
+        columns = [n for n, one in enumerate(self._persons) if one == person_id]
+        return self._least(range(len(self._robots)), columns)
+
+    def _least(
+        self, rows: Sequence[int], columns: Sequence[int]
+    ) -> SafetyMargin | None:
+        """The first by rank of these pairs; None where there are none."""
+        if not rows or not columns:
             return None
-        _, row, column = min(self._least[column] for column in columns)
-        return self._pair(row, column)
-
-    @cached_property
-    def _least(self) -> list[tuple[float, int, int]]:
-        """Of each column: the least rank, its row, and the column."""
-        rank = self._pairs.rank
-        rows, columns = rank.argmin(axis=0), np.arange(rank.shape[1])
-        lists = rank[rows, columns].tolist(), rows.tolist(), columns.tolist()
-        return list(zip(*lists, strict=True))
-
-    def _pair(self, row: int, column: int) -> SafetyMargin:
-        pairs, robot = self._pairs, self._robots[row][0]
-        parts = pairs.gap, pairs.walks, pairs.reaction, pairs.braking, pairs.age
-        gap, walks, reaction, braking, age = (one.item(row, column) for one in parts)
+        place = int(self._rank[np.ix_(rows, columns)].argmin())
+        row, column = rows[place // len(columns)], columns[place % len(columns)]
+        gap, walks, reaction, braking, age = (
+            term.item(row, column) for term in self._terms
+        )
+        robot = self._robots[row]
         return SafetyMargin(
             robot.robot_id,
             self._persons[column],
@@ -151,49 +162,8 @@ class LeastMargins:
             braking,
             age,
             robot.profile.assumed_braking,
-            pairs.known.item(row, column),
+            self._known.item(row, column),
         )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Pairs:
-    """Each robot with each look; all of shape (robots, looks), in metres and seconds.
-
-    Attributes:
-        rank: The margin; unknown ones rank before all that are known, and negative
-            ones before those.
-        known: Of a far person the least possible margin is, however old the look.
-    """
-
-    gap: _Floats
-    walks: _Floats
-    reaction: _Floats
-    braking: _Floats
-    age: _Floats
-    known: NDArray[np.bool_]
-    rank: _Floats
-
-    @classmethod
-    def of(
-        cls, robots: Sequence[_Placed], looks: Sequence[Sighting], now: Instant
-    ) -> "_Pairs":
-        """Margins of all pairs at once."""
-        placed = np.array([_facts(*one) for one in robots], float)
-        x, y, speed, brakes, half, pose_age = placed.reshape(-1, 6).T[:, :, np.newaxis]
-        seen = np.array([(one.x, one.y, one.age_s(now)) for one in looks], float)
-        to_x, to_y, look_age = seen.reshape(-1, 3).T
-        age = np.maximum(pose_age, look_age)
-        reacts_s = np.maximum(LIMITS.reaction_s, age + LIMITS.onward_s)
-        gap = np.hypot(x - to_x, y - to_y) - half - LIMITS.person_radius_m
-        walks = LIMITS.walking_m_s * (reacts_s + speed / brakes)
-        reaction = speed * reacts_s
-        braking = np.broadcast_to(speed * speed / (2 * brakes), gap.shape)
-        margin = gap - (walks + reaction + braking + LIMITS.uncertainty_m)
-        is_seen = look_age <= LIMITS.pose_lost_s
-        is_far = margin >= LIMITS.margin_clear_m
-        known = (pose_age <= LIMITS.pose_lost_s) & (is_seen | is_far)
-        rank = margin - _UNKNOWN_M * ~known - _INSIDE_M * (known & (margin < 0.0))
-        return cls(gap, walks, reaction, braking, age, known, rank)
 
 
 def _facts(robot: RobotState, odometry: Odometry, age_s: float) -> tuple[float, ...]:

@@ -48,7 +48,7 @@ LASTED_S = 0.3
 _SLIP_SHARE, _TURN_SHARE = 0.2, 0.3
 """Wheels slip, and more so in a turn (1)."""
 _BEHIND_M = 0.5
-"""So far behind ``base_link`` may be what a robot turns about (m)."""
+"""Farthest that a robot's turning point lies behind ``base_link`` (m)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +121,7 @@ class MotionTrack:
     _arrived: float = 0.0
     _ahead_s: float = 0.0
     _shown: Motion = UNMOVED
-    """By poses alone."""
+    """Motion by poses alone."""
 
     def note_odometry(
         self,
@@ -187,7 +187,7 @@ class MotionTrack:
         return True
 
     def _passed_s(self, later: Origin, arrived_s: float) -> tuple[float, float]:
-        """By how much a robot's clock has gained on ours, and the time passed (s).
+        """Gain of a robot's clock on ours, and the time passed (s).
 
         By the robot's clock if that can be: it rises, and gains less than a delay.
         """
@@ -304,7 +304,7 @@ def _noise(steps: Sequence[tuple[float, float]], jumps: frozenset[int]) -> float
 def _contradiction(
     samples: Sequence[_Sample], place: _Shift, heading: _Shift
 ) -> Contradiction | None:
-    """What of poses and twists cannot both be, the gravest first.
+    """The gravest contradiction between poses and twists; None: there is none.
 
     A jump (of place, of heading) proves nothing either way, so that it has to be found
     with the jumps and without them.
@@ -322,7 +322,7 @@ def _contradiction(
 def _unlike(
     samples: Sequence[_Sample], place: _Shift, heading: _Shift
 ) -> list[Contradiction]:
-    """What differs by more than slip, noise and unknown moments explain."""
+    """Differences that slip, noise and unknown moments do not explain."""
     forward = sideways = driven = turned = steered = 0.0
     slack_m, slack_rad = (
         LIMITS.standing_moved + _NOISES * one.noise + _JITTER * len(one.jumps)

@@ -102,7 +102,7 @@ class Parameter:
         )
 
     def strictest(self, several: Iterable[Value]) -> Value:
-        """What protects as much as each of them, for whichever class."""
+        """The value that protects as much as each of them, for any class."""
         all_ = [one for value in several for one in values_of(value)]
         found = max(all_) if self.protects == "more" else min(all_)
         return ByClass(found) if self.class_key is not None else found
@@ -136,12 +136,12 @@ class Parameters:
         word="threshold",
     )
     radius_m: ByClass = _row(
-        ByClass(LIMITS.ring_default_m),
+        ByClass(LIMITS.zone_default_m),
         key="radius_m",
         class_key="class_radii_m",
         unit="m",
-        least=LIMITS.ring_least_m,
-        most=LIMITS.ring_most_m,
+        least=LIMITS.zone_least_m,
+        most=LIMITS.zone_most_m,
         protects="more",
         variable="IVEG_SAFETY_RADIUS_M",
         says="Zone round a person or peer while fresh, inclusive (m).",

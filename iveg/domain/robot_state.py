@@ -1,23 +1,6 @@
-"""One robot as iVeg knows it, with the age of everything about it.
+"""One robot as iVeg knows it: newest observations with their age, doubts and obedience.
 
 Nothing here reads a clock: ages come from the ``now`` that is handed in.
-
-Doubt about one robot: what it says contradicts itself or physics.
-
-::
-
-    consistent ── contradicted for longer than a round trip ──> doubted
-               <── nothing of it contradicted for a second ────
-
-A doubt is named by a code, lowers speeds and never raises one
-(docs/safety.md, "Clear").
-
-Updates of one robot's state by the newest observation of each kind.
-
-Obedience of robots to the limits that they were told, measured in their motion.
-
-It is watched apart from decisions, since zones come and go while a robot that hears
-nothing drives on, and whatever the robot reports.  A robot that stands is obedient.
 """
 
 from bisect import bisect_left
@@ -63,7 +46,15 @@ class _Spell(NamedTuple):
 
 @dataclass(slots=True)
 class Doubts:
-    """The contradictions of one robot, by code."""
+    """Contradictions of one robot with itself or physics, by code.
+
+    ::
+
+        consistent ── contradicted for longer than a round trip ──> doubted
+                   <── nothing of it contradicted for a second ────
+
+    A doubt lowers speeds and never raises one (docs/safety.md, "Clear").
+    """
 
     _spells: dict[str, _Spell] = field(default_factory=dict)
 
@@ -245,7 +236,7 @@ class RobotState:
         return self.odometry is not None and not self.track.motion.moves
 
     def motion(self, now: Instant) -> Motion:
-        """How it moved in the last second before it was silent."""
+        """Its motion in the last second before it was silent."""
         motion, received = self.track.motion, self.odometry_received
         if motion.contradiction is None or received is None:
             return motion
@@ -262,7 +253,7 @@ class RobotState:
         if not poses:
             return None
         newest_s = poses[-1][0]
-        if stamp_s is None or not newest_s - LIMITS.ring_lasts_s <= stamp_s < newest_s:
+        if stamp_s is None or not newest_s - LIMITS.zone_lasts_s <= stamp_s < newest_s:
             return poses[-1][1]
         index = bisect_left(poses, stamp_s, key=lambda entry: entry[0])
         if index == 0:
@@ -277,7 +268,7 @@ class RobotState:
         self.heard_until = max(self.heard_until, moment)
 
     def heard_for_s(self, since: float) -> float:
-        """How long it has been heard without a silence since a moment (s)."""
+        """Time in which it was heard without a silence since a moment (s)."""
         return self.heard_until - max(since, self.heard_since)
 
     def received_at(self, kind: type[Observation]) -> Instant | None:
@@ -475,13 +466,16 @@ def slow_below(profile: RobotProfile) -> float:
 
 
 def allowed_s(profile: RobotProfile) -> float:
-    """How long a robot may take to obey (s)."""
+    """Time that a robot may take to obey (s)."""
     halves_s = (1.0 - HALF_SPEED) * profile.max_speed / profile.assumed_braking
     return max(_LEAST_S, halves_s + _BEYOND_BRAKING_S)
 
 
 class Obedience:
-    """Remembers since when each robot is told to be slow, and since when it is not.
+    """Obedience of robots to their limits, measured in their motion.
+
+    It is watched apart from decisions, since zones come and go while a robot that hears
+    nothing drives on, and whatever the robot reports.  A standing robot is obedient.
 
     Only time counts in which a robot was heard, by the moments of measurement
     (monotonic, s): what comes late accuses nobody, and a silence begins it anew.

@@ -1,12 +1,4 @@
-"""How it stands with a robot: one truth, which every surface says.
-
-What is known of one robot, and the situation that is found from it.
-
-Why a robot is slow: by its own report, or because iVeg tells it.
-
-A robot that people stopped or that something holds, and what lets it go.
-
-The situation of one robot: how it stands with it, why, and what a person can do.
+"""Situation of one robot: what it does, why, and what a person can do about it.
 
 Every surface that says how a robot is (cards, map, fleet page, status line, REST) takes
 it from here, so that no two of them can differ (docs/dashboard.md, "Situation").  Of
@@ -73,10 +65,10 @@ ORDER: Mapping[Kind, Level] = {
     "working": "working",
     "away": "away",
 }
-"""What can hold for a robot, in the order in which it is told, and how grave it is.
+"""Order in which they are told, and how grave each is.
 
-Of one robot and of the fleet the first that holds is told, in the colour of the gravest
-that holds.  Line, cards, map and REST follow this table; ``iveg.models.docs``
+The first that holds for a robot or the fleet is told, in the colour of the gravest that
+holds.  Line, cards, map and REST follow this table; ``iveg.models.docs``
 writes it for the page.
 """
 Action = Literal[
@@ -117,15 +109,15 @@ class Near:
 
 @dataclass(frozen=True, slots=True)
 class RobotFacts:
-    """What is known of one robot now.
+    """All that is known of one robot now.
 
     Attributes:
-        age_s: Of its pose (s); None while nobody knows.
+        age_s: Age of its pose (s); None while nobody knows.
         report: Its newest, while that is fresh.
-        alerts: What holds for it and for the fleet, of all that a situation names.
-        alert_about: Whom the first of them is about.
-        near: Whom the applied reason is about; ``told_near`` that of the speed limit.
-        out_of_service_by: Who took its camera out of service.
+        alerts: Active alerts of it and of the fleet that are a situation, in order.
+        alert_about: The person or robot of the first of them.
+        near: Cause of the applied reason; ``told_near`` that of the speed limit.
+        out_of_service_by: The person who took its camera out of service.
         stop: State of its STOP.
         is_resuming: The order under way is a resume.
         is_slow: Its measured speed is at most half of its greatest.
@@ -158,6 +150,17 @@ class RobotFacts:
         return 0.0 if self.report.holds else self.report.speed_factor
 
     @property
+    def is_silent(self) -> bool:
+        """Whether nothing is heard of it, now or ever."""
+        return self.link in ("LOST", "UNKNOWN")
+
+    @property
+    def is_held(self) -> bool:
+        """Whether it reports a hold, or waits for its resume."""
+        report = self.report
+        return report is not None and (bool(report.holds) or waits_for_resume(report))
+
+    @property
     def factor(self) -> float | None:
         """The strictest factor in force; None of a robot that never spoke."""
         if self.link == "UNKNOWN" and self.report is None:
@@ -167,7 +170,7 @@ class RobotFacts:
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """How it stands with one robot.
+    """One truth of one robot.
 
     Attributes:
         kind: Its place in ``ORDER``.
@@ -178,7 +181,7 @@ class Situation:
             says it all.
         about: The person, robot or hold that is the cause, where it is known.
         factor: The strictest speed factor in force; None: unknown.
-        level: Of the gravest that holds for the robot.
+        level: Level of the gravest that holds for the robot.
     """
 
     kind: Kind
@@ -208,8 +211,7 @@ def waits_for_resume(report: SafetyReport) -> bool:
 def limited(facts: RobotFacts) -> Iterator[Situation]:
     """Slow: by its own report, or because iVeg tells it and it does not say so yet."""
     report, limit, applied = facts.report, facts.limit, facts.applied
-    held = report is not None and (report.holds or waits_for_resume(report))
-    if held or facts.stop != "RUNNING":
+    if facts.is_held or facts.stop != "RUNNING":
         return
     if limit.speed_factor < applied:
         yield _slow("told", limit.speed_factor, limit.reason, facts.told_near, facts)
@@ -218,20 +220,12 @@ def limited(facts: RobotFacts) -> Iterator[Situation]:
 
 
 def _state(facts: RobotFacts) -> str:
-    """What a robot does that says that it is slow; it may only be on its way to it."""
-    if not facts.is_slow or (facts.applied <= 0.0 and not facts.stands):
+    """State of a robot that says that it is slow; it may only be on its way to it."""
+    if not facts.is_slow:
         return "told"
     if facts.applied <= 0.0:
-        return "stands"
+        return "stands" if facts.stands else "told"
     return "half" if facts.applied == HALF_SPEED else "slow"
-
-
-def nearest(facts: RobotFacts) -> Near | None:
-    """Somebody or something near that the robot is slow for; None: nobody."""
-    for near in (facts.near, facts.told_near):
-        if near is not None and near.kind in HAZARDS:
-            return near
-    return None
 
 
 def _slow(
@@ -274,10 +268,9 @@ def _lacking(slow: Situation, lacks: ClearCondition, own_id: str) -> Situation:
     )
 
 
-def because_of(of: Situation, near: Near) -> Situation:
-    """The same because of somebody near."""
-    slots = dict(of.slots)
-    why = near.kind
+def because_of(situation: Situation, near: Near) -> Situation:
+    """A situation whose cause is somebody near."""
+    slots, why = dict(situation.slots), near.kind
     if near.distance_m is not None:
         slots["distance"] = round(near.distance_m, 1)
         why = f"{near.kind}_at"
@@ -293,7 +286,7 @@ def because_of(of: Situation, near: Near) -> Situation:
         why = "person_unseen" if near.lane is None else "person_was_in"
     if near.kind == "robot" and near.about is not None:
         slots["about"] = near.about
-    return replace(of, why=why, cause=near.kind, about=near.about, slots=slots)
+    return replace(situation, why=why, cause=near.kind, about=near.about, slots=slots)
 
 
 _STOPS: Mapping[State, tuple[Kind, str, Action]] = {
@@ -330,14 +323,7 @@ _UNLOCKED: Mapping[str, Action] = {
     "remote": "release",
     "auto": "none",
 }
-"""What lifts a hold; the one that takes most comes first."""
-
-
-def is_locked(facts: RobotFacts) -> bool:
-    """Whether it stands by an order or a hold, as far as anybody knows."""
-    report = facts.report
-    held = report is not None and (report.holds or waits_for_resume(report))
-    return bool(held) or facts.stop in ("STANDING", "READY")
+"""Action that lifts a hold; the one that takes most comes first."""
 
 
 def locked(facts: RobotFacts) -> Iterator[Situation]:
@@ -345,14 +331,12 @@ def locked(facts: RobotFacts) -> Iterator[Situation]:
     report = facts.report
     if report is None or facts.stop not in ("RUNNING", "READY"):
         return
-    holds = report.holds
-    if not holds:
-        if waits_for_resume(report):
-            yield Situation("locked", "ready", "hold", action="resume")
-        return
-    first = min(holds, key=lambda one: list(_UNLOCKED).index(one.ack))
-    action, source = _UNLOCKED[first.ack], f"held_{first.source}"
-    yield Situation("locked", "held", "hold", source, first.id, action)
+    if report.holds:
+        first = min(report.holds, key=lambda one: list(_UNLOCKED).index(one.ack))
+        action, source = _UNLOCKED[first.ack], f"held_{first.source}"
+        yield Situation("locked", "held", "hold", source, first.id, action)
+    elif waits_for_resume(report):
+        yield Situation("locked", "ready", "hold", action="resume")
 
 
 _KINDS, _LEVELS = list(ORDER), get_args(Level)
@@ -360,7 +344,8 @@ _KINDS, _LEVELS = list(ORDER), get_args(Level)
 
 def situation_of(facts: RobotFacts) -> Situation:
     """The first of all that holds for a robot."""
-    holding = [*_alerted(facts), *(_silent if _is_silent(facts) else _heard)(facts)]
+    found = _silent(facts) if facts.is_silent else _present(facts)
+    holding = [*_alerted(facts), *found]
     first = min(holding, key=lambda one: _KINDS.index(one.kind))
     level = min((ORDER[one.kind] for one in holding), key=_LEVELS.index)
     if facts.link == "LATE" and first.state not in OF_STOPS:
@@ -368,11 +353,7 @@ def situation_of(facts: RobotFacts) -> Situation:
     return replace(first, level=level, factor=facts.factor)
 
 
-def _is_silent(facts: RobotFacts) -> bool:
-    return facts.link in ("LOST", "UNKNOWN")
-
-
-def _heard(facts: RobotFacts) -> Iterator[Situation]:
+def _present(facts: RobotFacts) -> Iterator[Situation]:
     """All that holds for a robot that is heard; its work if nothing else does."""
     yield from locked(facts)
     yield from stopping(facts)
@@ -409,7 +390,7 @@ def told_of(alerts: Iterable[Condition]) -> list[Condition]:
 def _alerted(facts: RobotFacts) -> Iterator[Situation]:
     for alert in facts.alerts:
         kind, state, action = ALERTED[alert.key]
-        if state == "lost_moving" and not _is_silent(facts):
+        if state == "lost_moving" and not facts.is_silent:
             continue  # It is heard again; the alert clears with the next tick.
         slots = {name: alert.slots[name] for name in _SLOTS if name in alert.slots}
         found = Situation(kind, state, "alarm", action=action, slots=slots)
@@ -437,7 +418,7 @@ def _silent(facts: RobotFacts) -> Iterator[Situation]:
 
 
 def _late(live: Situation, level: Level, facts: RobotFacts) -> tuple[Situation, Level]:
-    """What was true a moment ago; a late robot is no better off than it was."""
+    """A late robot: no better off than it was a moment ago."""
     if level == "danger":
         return live, level
     kind = min(live.kind, "unsure", key=_KINDS.index)
@@ -460,39 +441,37 @@ def _doubted(facts: RobotFacts) -> Iterator[Situation]:
         yield Situation(
             "contradiction", "contradicts", "doubt", action="check_robot", slots=slots
         )
-    elif not _says_clear(facts):
+        return
+    report, owes_none = facts.report, facts.stop != "RUNNING" or facts.is_replay
+    if owes_none or facts.applied < FULL_SPEED:
+        return
+    # "Clear" needs the robot's own word.
+    if report is None or report.reason != "clear":
         yield Situation("unsure", "unreported", "link", action="check_robot")
-
-
-def _says_clear(facts: RobotFacts) -> bool:
-    """Whether it reports itself that nothing limits it, or owes no such report."""
-    if facts.stop != "RUNNING" or facts.is_replay:
-        return True
-    report = facts.report
-    return report is not None and (report.reason == "clear" or facts.applied < 1.0)
 
 
 def _blind(facts: RobotFacts) -> Iterator[Situation]:
     """Its camera is out of service or not being read: it warns nobody of people.
 
-    Who is near it all the same is told with it.
+    Somebody who is near it all the same is told with it.
     """
     by, own = facts.out_of_service_by, ClearCondition("detector", facts.robot_id)
-    if is_locked(facts) or (by is None and own not in facts.unmet):
+    if facts.is_held or facts.stop in ("STANDING", "READY"):
         return
-    blind = Situation("blind", "no_camera", "camera", action="check_camera")
-    if by is None:
-        blind = replace(blind, why="no_detector_own")
-    else:
-        blind = replace(blind, why="camera_out", slots={"by": by})
-    near = nearest(facts)
-    yield blind if near is None else because_of(blind, near)
+    if by is None and own not in facts.unmet:
+        return
+    why, slots = ("no_detector_own", {}) if by is None else ("camera_out", {"by": by})
+    blind = Situation(
+        "blind", "no_camera", "camera", why, None, "check_camera", None, slots
+    )
+    for near in (facts.near, facts.told_near):
+        if near is not None and near.kind in HAZARDS:
+            blind = because_of(blind, near)
+            break
+    yield blind
 
 
 def _at_work(facts: RobotFacts) -> Situation:
     """Nothing else holds: "clear" is earned by a way that is driven, not by waiting."""
-    if facts.is_replay:
-        return Situation("working", "replay", "clear")
-    if facts.stands:
-        return Situation("working", "waiting", "clear")
-    return Situation("working", "clear", "clear")
+    state = "waiting" if facts.stands else "clear"
+    return Situation("working", "replay" if facts.is_replay else state, "clear")

@@ -1,4 +1,4 @@
-"""The laser as a second witness: what stands near a robot and nobody has explained.
+"""The laser as a second witness: obstacles near a robot that nobody has explained.
 
 A camera sees less than half of the people beside a robot; its laser sees most of the
 others.  Of a scan those returns count that are within two metres of the robot's outline
@@ -8,8 +8,6 @@ plan draws what stands there only the robot's own path counts, or every row woul
 it.
 
 A witness only adds: it lifts no limit, and finds no spot empty.
-
-Something near a robot that its laser sees and nobody explains.
 """
 
 import math
@@ -26,35 +24,17 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import LaserScan
 
 LASTS_S = 0.2
-"""What is shorter is noise, or an insect."""
+"""Anything shorter is noise, or an insect."""
 _LARGEST_M = 1.0
 """Two people side by side; what is larger is counted once it moves."""
 _MOVED_M = 0.4
 _SMOOTHED_S = 0.4
 _WALKED_M, _WALKED_S, _PASSED_M = 0.5, 0.5, 0.3
-"""Who walks goes so far, for so long, and so far as seen from the robot: not so what it
-tows, nor the part of a wall that it sees as it passes."""
+"""Least way, time, and way as seen from the robot, of somebody who walks: more than of
+what it tows, or of the part of a wall that it sees as it passes."""
 _WALKS_M_S = (0.3, 2.5)
 _STANDS_S = 10.0
-"""Who walked and stands since is still somebody, for as long as a ring lasts."""
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """Neighbouring returns of one scan that nobody explained.
-
-    Attributes:
-        x: Their middle in ``map`` (m); ``y`` likewise.
-        size_m: From the first to the last.
-        gap_m: From the robot's outline to the nearest.
-        beside: Their middle in the robot's ``base_link`` (m).
-    """
-
-    x: float
-    y: float
-    size_m: float
-    gap_m: float
-    beside: tuple[float, float]
+"""Somebody who walked and stands since counts for as long as a zone lasts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,15 +67,9 @@ class Obstacle:
     passed_m: float = 0.0
     walked_at: float = -math.inf
 
-    @classmethod
-    def new(cls, body: Body, now: float) -> "Obstacle":
-        """Something that is seen for the first time."""
-        x, y = body.x, body.y
-        return cls(x, y, x, y, body.size_m, body.gap_m, now, now, body.beside)
-
     @property
     def way_m(self) -> float:
-        """How far it is from where it was first (m)."""
+        """Distance from where it was seen first (m)."""
         return math.hypot(self.x - self.first_x, self.y - self.first_y)
 
     @property
@@ -120,22 +94,22 @@ class Obstacle:
             and least <= math.hypot(self.vx, self.vy) <= most
         )
 
-    def seen_again(self, body: Body, now: float) -> "Obstacle":
-        """The same, seen again."""
-        gain = (now - self.at) / (_SMOOTHED_S + now - self.at)
-        after_s = max(now - self.at, 1e-3)
+    def seen_again(self, found: "Obstacle") -> "Obstacle":
+        """The obstacle with what a later scan found of it."""
+        after_s = found.at - self.at
+        gain, apart_s = after_s / (_SMOOTHED_S + after_s), max(after_s, 1e-3)
         seen = replace(
             self,
-            x=body.x,
-            y=body.y,
-            size_m=body.size_m,
-            gap_m=body.gap_m,
-            at=now,
-            vx=self.vx + gain * ((body.x - self.x) / after_s - self.vx),
-            vy=self.vy + gain * ((body.y - self.y) / after_s - self.vy),
-            passed_m=math.dist(body.beside, self.first_seen),
+            x=found.x,
+            y=found.y,
+            size_m=found.size_m,
+            gap_m=found.gap_m,
+            at=found.at,
+            vx=self.vx + gain * ((found.x - self.x) / apart_s - self.vx),
+            vy=self.vy + gain * ((found.y - self.y) / apart_s - self.vy),
+            passed_m=math.dist(found.first_seen, self.first_seen),
         )
-        return replace(seen, walked_at=now) if seen.walks else seen
+        return replace(seen, walked_at=found.at) if seen.walks else seen
 
     @property
     def fits(self) -> bool:
@@ -164,7 +138,7 @@ _APART_M = 0.3
 """Returns of one body are not farther apart."""
 _LEAST_RETURNS = 2
 _BESIDE_M = 0.2
-"""Of the robot's own path, where there is no plan."""
+"""Margin beside the robot's own path, where there is no plan."""
 _TURN_OF_ONE_S = 0.1
 _EVERY_S = 0.09
 """Ten sweeps a second are enough, and leave the robot's processor alone."""
@@ -172,7 +146,7 @@ _EVERY_S = 0.09
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """What stands in the greenhouse, in ``map`` (m).
+    """Outlines of the greenhouse and its rows, posts and obstacles, in ``map`` (m).
 
     Attributes:
         bounds: The outer wall.
@@ -202,7 +176,7 @@ class Plan:
         return len(self.rectangles) + len(self.posts) > 0
 
     def distance_to(self, x: _Floats, y: _Floats) -> _Floats:
-        """How far points, shape (n,), are from the nearest thing drawn (m)."""
+        """Distances of points, shape (n,), from the nearest thing drawn (m)."""
         area = self.bounds
         inside = np.minimum.reduce(
             (x - area.xmin, area.xmax - x, y - area.ymin, area.ymax - y)
@@ -214,18 +188,9 @@ class Plan:
             nearest = np.minimum(nearest, _from_posts(self.posts, x, y).min(0))
         return nearest
 
-    def about(self, pose: Pose2D, reach_m: float) -> "Plan":
-        """The part of it that is within reach of a place."""
-        x, y = np.array([pose.x]), np.array([pose.y])
-        return Plan(
-            self.bounds,
-            self.rectangles[_from_areas(self.rectangles, x, y)[:, 0] <= reach_m],
-            self.posts[_from_posts(self.posts, x, y)[:, 0] <= reach_m],
-        )
-
 
 def _from_areas(areas: _Floats, x: _Floats, y: _Floats) -> _Floats:
-    """How far points are from rectangles (m); shape (rectangles, points)."""
+    """Distances of points from rectangles (m); shape (rectangles, points)."""
     xmin, ymin, xmax, ymax = areas.T[..., None]
     aside = np.maximum(np.maximum(xmin - x, x - xmax), 0.0)
     along = np.maximum(np.maximum(ymin - y, y - ymax), 0.0)
@@ -234,7 +199,7 @@ def _from_areas(areas: _Floats, x: _Floats, y: _Floats) -> _Floats:
 
 
 def _from_posts(posts: _Floats, x: _Floats, y: _Floats) -> _Floats:
-    """How far points are from posts (m); shape (posts, points)."""
+    """Distances of points from posts (m); shape (posts, points)."""
     post_x, post_y, radius = posts.T[..., None]
     away: _Floats = np.hypot(x - post_x, y - post_y) - radius
     return away
@@ -248,7 +213,7 @@ class Outline:
     width: float = CAUTIOUS.width
 
     def gap_to(self, x: _Floats, y: _Floats) -> _Floats:
-        """How far points in ``base_link``, shape (n,), are from it (m)."""
+        """Distances of points in ``base_link``, shape (n,), from it (m)."""
         ahead = np.maximum(np.abs(x) - self.length / 2, 0.0)
         aside = np.maximum(np.abs(y) - self.width / 2, 0.0)
         gap: _Floats = np.hypot(ahead, aside)
@@ -264,7 +229,7 @@ class KnownPeer:
 
 
 class Witness:
-    """What one robot's laser sees beside it.
+    """Laser tracks of the obstacles beside one robot.
 
     Args:
         outline: The robot's body.
@@ -293,11 +258,12 @@ class Witness:
         if self._plan is None or not self._plan.is_drawn:
             bodies = [one for one in bodies if self._is_ahead(one, pose, twist)]
         earlier = [one for one in self._known if now - one.at <= GONE_S]
-        seen = [self._joined(body, earlier, pose, now) for body in bodies]
+        found = [self._measured(body, pose, now) for body in bodies]
+        seen = [self._joined(one, earlier) for one in found]
         self._known = (*seen, *earlier)
 
     def present(self, now: float) -> list[Obstacle]:
-        """What counts and was there within the last half second."""
+        """Obstacles that count and were there within the last half second."""
         return [one for one in self._known if one.counts and now - one.at <= GONE_S]
 
     def obstacle(self, now: float) -> Obstacle | None:
@@ -318,15 +284,13 @@ class Witness:
         """Returns near the robot that nothing explains; shape (n, 2), in ``map``."""
         x, y = scan.points(Pose2D(0.0, 0.0, 0.0)).astype(np.float64).T
         gap = self._outline.gap_to(x, y)
-        near = (gap > 0.0) & (gap <= LIMITS.ring_default_m)
+        near = (gap > 0.0) & (gap <= LIMITS.zone_default_m)
         away = np.hypot(x, y)[near]
-        farthest = float(away.max(initial=0.0))
         x, y = _moved(x[near], y[near], pose)
         left = np.ones(x.shape, np.bool_)
         if self._plan is not None:
             blurred = PLAN_M + abs(twist.angular_z) * _TURN_S * away
-            plan = self._plan.about(pose, farthest + 2 * PLAN_M)
-            left = plan.distance_to(x, y) > blurred
+            left = self._plan.distance_to(x, y) > blurred
         for one in known:
             ahead, aside = _seen_from(one.pose, np.column_stack((x, y)))
             if one.stands:
@@ -341,35 +305,31 @@ class Witness:
         ahead = (x > 0.0) == (twist.linear_x >= 0.0)
         return bool(np.any(ahead & (np.abs(y) <= self._outline.width / 2 + _BESIDE_M)))
 
-    def _joined(
-        self, body: _Floats, earlier: list[Obstacle], pose: Pose2D, now: float
-    ) -> Obstacle:
-        """A body as the nearest earlier obstacle that it may be, or a new one.
+    def _joined(self, found: Obstacle, earlier: list[Obstacle]) -> Obstacle:
+        """The nearest earlier obstacle that it may be, seen again; else it is new.
 
         That one is taken out of ``earlier``.
         """
-        found = self._measured(body, pose)
-        x, y = found.x, found.y
-        near = min(
-            earlier, key=lambda one: math.hypot(one.x - x, one.y - y), default=None
-        )
-        if near is not None:
-            reach = _APART_M + LIMITS.walking_m_s * (now - near.at)
-            if math.hypot(near.x - x, near.y - y) <= reach:
-                earlier.remove(near)
-                return near.seen_again(found, now)
-        return Obstacle.new(found, now)
 
-    def _measured(self, body: _Floats, pose: Pose2D) -> Body:
+        def away(one: Obstacle) -> float:
+            return math.hypot(one.x - found.x, one.y - found.y)
+
+        near = min(earlier, key=away, default=None)
+        if near is None:
+            return found
+        if away(near) > _APART_M + LIMITS.walking_m_s * (found.at - near.at):
+            return found
+        earlier.remove(near)
+        return near.seen_again(found)
+
+    def _measured(self, body: _Floats, pose: Pose2D, now: float) -> Obstacle:
+        """Neighbouring returns as an obstacle that is seen for the first time."""
         x, y = (float(one) for one in body.mean(0))
         ahead, aside = _seen_from(pose, body)
-        return Body(
-            x,
-            y,
-            float(np.hypot(*np.ptp(body, axis=0))),
-            float(self._outline.gap_to(ahead, aside).min()),
-            (float(ahead.mean()), float(aside.mean())),
-        )
+        size_m = float(np.hypot(*np.ptp(body, axis=0)))
+        gap_m = float(self._outline.gap_to(ahead, aside).min())
+        beside = float(ahead.mean()), float(aside.mean())
+        return Obstacle(x, y, x, y, size_m, gap_m, now, now, beside)
 
 
 def _moved(x: _Floats, y: _Floats, frame: Pose2D) -> tuple[_Floats, _Floats]:

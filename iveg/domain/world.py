@@ -2,37 +2,14 @@
 
 ``World.apply`` takes one observation; older ones and twins change nothing and are
 counted.  Nothing here reads a clock: ages come from the ``now`` that is handed in.
-
-Upper bound of the age of a robot's message, proven by the feedback that it echoes.
-
-Robots name in every message the newest feedback that they have received.  What was
-measured after that feedback arrived was measured after it left iVeg, so the message is
-at most as old as the feedback is now, on iVeg's own monotonic clock.  No clock of the
-robot enters and no delay is guessed (docs/safety.md, "Age").
-
-Transport that feeds each robot with odometry and scans.
-
-They come twice, straight from MQTT (``direct``) and through Orion (``fiware``).  Any
-other way counts as direct.
-
-Whether what a robot says can be true: by physics, and by what it said before.
-
-Each finding is a code, a contradiction of ``Doubts`` of a robot's state; what
-cannot be true of any robot is refused before it comes here (``ngsi.payloads``).  Only
-news is compared, and the longer of the robot's time and ours counts, so that lateness
-and reordering are no contradictions.  docs/safety.md, "Doubt", has the table.
-
-Other servers that robots hear, found in what robots echo of feedback.
-
-Two authors steer one fleet where a robot hears feedback that this iVeg never sent, and
-goes on hearing more of it.  An earlier run of this iVeg says nothing more, so it is
-none.  One robot's word is enough, as it slows nobody and frees nobody.
+Beside it stands what it judges by: the ledger of feedback, whose echoes prove ages; the
+transport that feeds each robot; what contradicts physics; and other servers' feedback.
 """
 
 from bisect import bisect_right
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf
 from typing import Literal
 
@@ -63,15 +40,17 @@ from iveg.domain.stream_order import OrderVerdict
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from iveg.domain.words import WordAnswers
 
+# --- proven age -------------------------------------------------------------------
+#
+# Robots name in every message the newest feedback that they have received.  What was
+# measured after that feedback arrived was measured after it left iVeg, so the message
+# is at most as old as the feedback is now, on iVeg's own monotonic clock.  No clock of
+# the robot enters and no delay is guessed (docs/safety.md, "Age").
+
 _APART_S = 0.05
 """Moments closer than this share the earlier one, so that ages come out older."""
-_LATELY_S = 60.0
-_LONG_AGO_APART_S = 1.0
-"""The same of what left iVeg longer ago than ``_LATELY_S``: whether an age is sixty
-seconds or sixty-one changes nothing."""
-_KEPT_S = 900.0
-_MOST = 4_000
-"""Moments at which those of long ago are thinned out: 2,100 of them stay at most."""
+_MOST = 36_000
+"""Moments; the older half of them, fifteen minutes at least, goes then."""
 
 
 class FeedbackLedger:
@@ -91,18 +70,7 @@ class FeedbackLedger:
         self._firsts.append(first)
         self._moments.append(now)
         if len(self._moments) > _MOST:
-            self._thin_out(now)
-
-    def _thin_out(self, now: float) -> None:
-        kept: list[tuple[int, float]] = []
-        for first, moment in zip(self._firsts, self._moments, strict=True):
-            is_near = bool(kept) and moment - kept[-1][1] < _LONG_AGO_APART_S
-            is_spare = now - moment > _LATELY_S and is_near
-            # The earliest stays, so that ages come out older.
-            if now - moment <= _KEPT_S and not is_spare:
-                kept.append((first, moment))
-        self._firsts = [first for first, _ in kept]
-        self._moments = [moment for _, moment in kept]
+            del self._firsts[: _MOST // 2], self._moments[: _MOST // 2]
 
     def is_sent(self, echo: FeedbackRef) -> bool:
         """Whether this boot has sent that feedback."""
@@ -119,10 +87,14 @@ class FeedbackLedger:
         return None if index < 0 else self._moments[index]
 
 
+# --- feeds ------------------------------------------------------------------------
+#
+# Odometry and scans come twice, straight from MQTT and through Orion.
+
 SILENT_S = 1.0
 """A direct copy older than this is missed."""
 OVERTAKES_S = 0.2
-"""What comes through FIWARE that much after the last direct message is no twin."""
+"""A message through FIWARE so long after the last direct one is no twin."""
 
 
 @dataclass(slots=True)
@@ -157,21 +129,14 @@ class Feed:
         return FIWARE.id if is_unheard or has_fallen_back else self._direct
 
 
-@dataclass(slots=True)
-class Feeds:
-    """The feeds of a fleet, by robot and kind."""
-
-    _known: defaultdict[tuple[str, type[Observation]], Feed] = field(
-        default_factory=lambda: defaultdict(Feed)
-    )
-
-    def of(self, robot_id: str, kind: type[Observation] = Odometry) -> Feed:
-        """One feed."""
-        return self._known[robot_id, kind]
-
+# --- contradictions ---------------------------------------------------------------
+#
+# Whether what a robot says can be true: by physics, and by what it said before.  Only
+# news is compared, and the longer of the robot's time and ours counts, so that lateness
+# and reordering are no contradictions.  docs/safety.md, "Doubt", has the table.
 
 Code = Literal["pose_outside", "too_fast", "jumped"]
-"""Beside those of :mod:`~iveg.domain.motion`."""
+"""Contradictions, beside those of :mod:`~iveg.domain.motion`."""
 
 ANY_ROBOT_M_S, ANY_ROBOT_RAD_S = 10.0, 10.0
 """Faster than any robot in a greenhouse: the bound of one that nobody described."""
@@ -194,7 +159,7 @@ class _Anchor:
     at: float
 
     def passed_s(self, later: Origin, now: float) -> float:
-        """How long ago it was measured at most, when ``later`` was (s)."""
+        """Longest time since it was measured, when ``later`` was (s)."""
         earlier, arrived = self.said.origin, now - self.at
         if earlier.seq is None or later.seq is None:
             return arrived + _LATE_S  # whoever does not count may come in any order
@@ -265,13 +230,19 @@ def _own_s_between(earlier: Origin, later: Origin) -> float | None:
     return None if then is None or now is None else now - then
 
 
+# --- other servers ----------------------------------------------------------------
+#
+# Two authors steer one fleet where a robot hears feedback that this iVeg never sent,
+# and goes on hearing more of it.  An earlier run of this iVeg says nothing more, so it
+# is none.  One robot's word is enough, as it slows nobody and frees nobody.
+
 SPOKEN_FOR_S = 3.0
 """An earlier run may end that much after this one began."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Heard:
-    """What one robot hears of others: the newest, and its first and last news.
+    """Feedback of others that one robot hears: newest counts, first and last news.
 
     Attributes:
         news: When it first heard of them (monotonic, s), and last anything new.
@@ -314,14 +285,16 @@ class OtherAuthors:
                 boot
                 for one in self._heard.values()
                 if one.news[1] - one.news[0] >= SPOKEN_FOR_S
-                and now.mono - one.news[1] <= LIMITS.ring_lasts_s
+                and now.mono - one.news[1] <= LIMITS.zone_lasts_s
                 for boot in one.others
             }
         )
 
 
+# --- the world --------------------------------------------------------------------
+
 _NO_MESSAGE = Climate, HeartbeatProbe, RefusedFrame
-"""What is in no robot's stream of messages."""
+"""Observations that are in no robot's stream of messages."""
 _ASKED_AGE_S = LIMITS.late_s + 0.1
 
 
@@ -359,7 +332,7 @@ class World:
         self.climate: Climate | None = None
         self.climate_received: Instant | None = None
         self.counters: Counter[str] = Counter()
-        self.feeds = Feeds()
+        self._feeds = defaultdict[tuple[str, type[Observation]], Feed](Feed)
         self.returned_detectors: list[str] = []
         self.word_answers = WordAnswers()
 
@@ -373,6 +346,10 @@ class World:
             return self.robots[robot_id]
         except KeyError:
             raise UnknownRobotError(robot_id) from None
+
+    def feed(self, robot_id: str, kind: type[Observation] = Odometry) -> Feed:
+        """The transports of one kind of telemetry of a robot."""
+        return self._feeds[robot_id, kind]
 
     def is_past(
         self, robot_id: str, kind: type[Observation], boot: str, seq: int
@@ -499,7 +476,7 @@ class World:
     def _likely_age(
         self, robot: RobotState, received: Received, origin: Origin
     ) -> float | None:
-        """How old a message was when it came, by its stamp and our probe (s)."""
+        """Age of a message when it came, by its stamp and our probe (s)."""
         at = received.at
         if received.asked:
             return _age_when_asked(origin, at)
@@ -512,7 +489,7 @@ class World:
     def _measured_at(
         self, origin: Origin, received: Received, likely: float | None
     ) -> float | None:
-        """The moment that a message was not measured before (monotonic, s).
+        """Lower bound of the measurement time (monotonic, s); None: nobody knows.
 
         Of a robot that echoes only a proof counts.
         """
@@ -525,7 +502,7 @@ class World:
         return min(moment, now - (_ASKED_AGE_S if received.asked else 0.0))
 
     def age_then(self, received: Received) -> float:
-        """How old the newest of its kind was at most when it came (s).
+        """Greatest age of the newest of its kind when it came (s).
 
         Infinite where nobody knows, and for odometry whose age is only estimated: an
         estimate proves nothing.
@@ -552,7 +529,7 @@ class World:
         return not present_boot.is_past(origin.boot, proven_at)
 
     def _newest_at(self, observation: Observation) -> float | None:
-        """The moment that the newest of this kind was not measured before."""
+        """Lower bound of when the newest of this kind was measured (monotonic, s)."""
         if isinstance(observation, SafetyReport):
             reported = self.robot(observation.robot_id).safety_received
             return None if reported is None else reported.mono
@@ -572,7 +549,7 @@ class World:
         kind = kind_of(received.observation)
         if kind not in (Odometry, LaserScan):
             return verdict
-        feed = self.feeds.of(robot.robot_id, kind)
+        feed = self.feed(robot.robot_id, kind)
         at, counted = received.at.mono, origin.seq is not None
         if received.transport == FIWARE.id and not counted and feed.is_direct(at):
             verdict = "duplicate"
@@ -585,6 +562,6 @@ class World:
 
 
 def _age_when_asked(origin: Origin, at: Instant) -> float:
-    """How old Orion's answer is at least (s): nothing that was asked for looks live."""
+    """Least age of Orion's answer (s): nothing that was asked for looks live."""
     stamped = 0.0 if origin.stamp_s is None else at.wall - origin.stamp_s
     return max(stamped, _ASKED_AGE_S)

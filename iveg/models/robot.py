@@ -210,9 +210,9 @@ class SpeedLimit(Model):
 class Encounter(Model):
     """A zone that the robot will reach (docs/safety.md, "Foresight").
 
-    A zone that the robot will reach, as it and the person or peer go now, or within two
-    seconds once it is let go, if it is slow ([safety.md](../safety.md), "Foresight").
-    Nothing has happened yet; a forecast older than a second is left out.
+    A zone that the robot will reach, as it and the person or peer go now, or once it is
+    let go, if it is slow ([safety.md](../safety.md), "Foresight"). Nothing has happened
+    yet; a forecast older than a second is left out.
 
     Attributes:
         cause: Id of the person or robot.

@@ -96,7 +96,7 @@ class Neighbours:
     def present(self, own: Pose2D | None, now: float) -> list[Neighbour]:
         """All but this robot; one reported on two topics is listed once.
 
-        A peer whose pose stays the same message for ``ring_lasts_s`` is left out:
+        A peer whose pose stays the same message for ``zone_lasts_s`` is left out:
         nobody knows any more where it is, or that it is there at all.
         """
         live = [one for one in self._heard.values() if now - one.at <= SILENT_S]
@@ -105,7 +105,7 @@ class Neighbours:
             feedback = heard.feedback
             for one in self._people(feedback, own):
                 found[one.kind, round(one.x, 1), round(one.y, 1)] = one
-            peer = feedback.pose if now - heard.posed <= LIMITS.ring_lasts_s else None
+            peer = feedback.pose if now - heard.posed <= LIMITS.zone_lasts_s else None
             if feedback.robot_id != self._me and peer is not None:
                 name = feedback.robot_id
                 zone_m = _radius_of(feedback, "robot")
@@ -128,7 +128,7 @@ class Neighbours:
 
 def _radius_of(feedback: Feedback, class_: Class) -> float:
     """Radius of the rule for a fresh zone of this class (m)."""
-    return feedback.rule.get("radius_m", {}).get(class_, LIMITS.ring_default_m)
+    return feedback.rule.get("radius_m", {}).get(class_, LIMITS.zone_default_m)
 
 
 # --- costmap ----------------------------------------------------------------------

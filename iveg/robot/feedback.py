@@ -185,7 +185,7 @@ class PeerFeedback:
         radius_m = self._radii.of("robot", now)
         for name, topic in self._topics.items():
             silence = now - topic.at
-            if silence > LIMITS.ring_lasts_s:
+            if silence > LIMITS.zone_lasts_s:
                 continue
             yield _mandated(topic.speed_limit, silence)
             for kept in topic.alerts.values():
@@ -390,7 +390,7 @@ class Authors:
             if one.is_silent(self._slow_s, now):
                 yield _SILENT
             yield from one.peer_feedback.caps(own, slowed, now)
-        if now - self._crowded_at <= LIMITS.ring_lasts_s:
+        if now - self._crowded_at <= LIMITS.zone_lasts_s:
             yield _SILENT
 
     def ahead(self, now: float) -> Iterable[Ahead]:
@@ -403,7 +403,7 @@ class Authors:
         return self._kept[0].peer_feedback.peers(now) if len(self._kept) == 1 else ()
 
     def _forget(self, now: float) -> None:
-        last = now - LIMITS.ring_lasts_s
+        last = now - LIMITS.zone_lasts_s
         if any(one.spoke_at < last for one in self._kept):
             self._kept = [one for one in self._kept if one.spoke_at >= last]
 

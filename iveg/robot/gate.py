@@ -9,7 +9,6 @@ from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.rule.paths import (
     EVERY_S,
-    HOLDS_S,
     HORIZON_S,
     MOVES_M_S,
     PLAN_LASTS_S,
@@ -158,7 +157,7 @@ class Lookahead:
         due, held = met(speed, slows_within_s(self._braking, speed)), set[Cap]()
         if self._caps:
             # What lies ahead again at the speed of before is no reason to speed up.
-            held = met(speed, HOLDS_S) | met(self._speed_before, HORIZON_S)
+            held = met(speed, HORIZON_S) | met(self._speed_before, HORIZON_S)
         self._caps = tuple(
             cap for _, cap in ahead if cap in due or (cap in held and cap in self._caps)
         )

@@ -5,24 +5,23 @@ which is transformed into the robot's or the map's frame.
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.fleet import RobotProfile
-from iveg.domain.geometry import Box3D, Pose2D
-from iveg.domain.observations import Detection, DetectionFrame, Origin
+from iveg.domain.geometry import Box3D
+from iveg.domain.observations import UNKNOWN_ORIGIN, Detection, DetectionFrame
 
 # --- mask -------------------------------------------------------------------------
 #
-# Pixels of a target: the detector's bitset without its fringe of leaves.
+# Pixels of a target without its fringe of leaves.
 #
-# Source: the seed paper, section "Spatial grounding": membership and bit position,
-# kernel area, erosion by opening.  Its erosion formula is printed as::
+# Source: the seed paper, section "Spatial grounding": kernel area, erosion by opening.
+# Its erosion formula is printed as::
 #
 #     M_eroded = ⋃ t=1..T  M(t-1) ∩ ¬[(M(t-1) ⊖ SE) ⊕ SE]
 #
@@ -41,35 +40,6 @@ Mask = NDArray[np.bool_]
 
 EDGE_LIMIT = 8192
 """Largest accepted edge of a picture (pixels)."""
-
-
-def read_mask(bits: bytes, width: int, height: int) -> Mask:
-    """Whether each pixel is the target's (the membership equation).
-
-    Column x of row y has index = y·w + x, byte b = ⌊index / 8⌋ and bit
-    n = 7 - (index mod 8): rows follow each other without padding, the first pixel is a
-    byte's highest bit.
-
-    Returns:
-        Shape (height, width).
-
-    Raises:
-        UnreadableError: The size is not positive, or differs from the number of bytes.
-    """
-    if not (0 < width <= EDGE_LIMIT and 0 < height <= EDGE_LIMIT):
-        raise UnreadableError("bad_mask_size", f"{width} × {height} pixels")
-    count = width * height
-    if len(bits) != math.ceil(count / 8):
-        raise UnreadableError(
-            "bad_mask_bytes", f"{len(bits)} bytes for {width} × {height} pixels"
-        )
-    flat = np.unpackbits(np.frombuffer(bits, np.uint8), count=count)
-    return flat.reshape(height, width).astype(np.bool_)
-
-
-def write_mask(mask: Mask) -> bytes:
-    """The bitset of a mask; the inverse of ``read_mask``."""
-    return np.packbits(mask).tobytes()
 
 
 def kernel_area(factor: float, least: float, most: float) -> float:
@@ -265,10 +235,9 @@ def cloud_index(
 # the table of object parameters; Algorithm 1's ``SpatialGrounding``. The printed box
 # holds the *visible* surface only, so its centre stands before the true one: by about
 # 0.18 m for a person, by half its length for a robot seen from behind.
-# ``Grounding.hidden`` mends it where it is known.
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Segment:
     """Output of detector and mask network for one target.
 
@@ -276,17 +245,14 @@ class Segment:
         class_id: As the network names it.
         probability: C_i, 0 to 1.
         x_c: Centre of the 2D box (pixels); ``y_c`` likewise.
-        width: Of the box and of the mask that is cropped to it (pixels); ``height``.
-        bits: The mask, one bit a pixel (``mask.read_mask``).
+        mask: Pixels of the box that are the target's; shape (height, width).
     """
 
     class_id: str
     probability: float
     x_c: float
     y_c: float
-    width: int
-    height: int
-    bits: bytes
+    mask: Mask
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,10 +265,8 @@ class Grounding:
         most_kernel: MAXKERNEL, as share of the squared box width: a constant number of
             pixels that only trims a person at 1.5 m would eat one at 6 m.
         iterations: T; ``rim`` of them are not grown back (``mask.eroded``).
-        factors: e_c by class, 0 to 100; ``factor`` for any other.
+        factor: e_c, 0 to 100.
         most_jump: τ_max (m).
-        hidden: How far a class goes on behind what is seen of it (m), added to the far
-            face; none by default, which is the paper's box.  0.36 fits a person.
     """
 
     p_min: float = 0.80
@@ -310,16 +274,13 @@ class Grounding:
     most_kernel: float = 0.006
     iterations: int = 3
     rim: int = 2
-    factors: Mapping[str, float] = field(default_factory=dict)
     factor: float = 0.0
     most_jump: float = 0.10
-    hidden: Mapping[str, float] = field(default_factory=dict)
 
-    def cross(self, class_id: str, width: int) -> int:
+    def cross(self, width: int) -> int:
         """Edge of the structuring element (pixels) in a box ``width`` wide."""
-        factor = self.factors.get(class_id, self.factor)
         most = self.most_kernel * width**2
-        return kernel_size(kernel_area(factor, self.least_kernel, most))
+        return kernel_size(kernel_area(self.factor, self.least_kernel, most))
 
 
 DEFAULT = Grounding()
@@ -346,74 +307,33 @@ Ungrounded = Literal["unsure", "empty", "no_depth", "unreadable"]
 holds nothing of the picture; ``no_depth``: not one point passed the filter."""
 
 
-@dataclass(frozen=True, slots=True)
-class Mount:
-    """Mounting pose of a camera in ``base_link``; it looks level along x."""
-
-    pose: Pose2D
-    height: float
-
-    @classmethod
-    def of(cls, profile: RobotProfile) -> "Mount":
-        """The camera of a kind of robot."""
-        return cls(profile.camera, profile.camera_height)
-
-
 def ground(
     segment: Segment, picture: DepthPicture, settings: Grounding = DEFAULT
 ) -> Grounded | Ungrounded:
     """Locate one target in the camera's optical frame.
 
     Raises:
-        UnreadableError: A probability, position or mask out of range.
+        UnreadableError: The probability is out of range.
     """
-    _examine(segment)
+    if not 0.0 <= segment.probability <= 1.0:
+        raise UnreadableError("bad_probability", f"{segment.probability}")
     if segment.probability < settings.p_min:
         return "unsure"
-    index = cloud_index(
-        body_of(segment, settings),
-        top_left(segment.x_c, segment.y_c, segment.width, segment.height),
-        picture.camera,
-    )
+    height, width = segment.mask.shape
+    cross = settings.cross(width)
+    body = eroded(segment.mask, cross, settings.iterations, settings.rim)
+    corner = top_left(segment.x_c, segment.y_c, width, height)
+    index = cloud_index(body, corner, picture.camera)
     if not index.size:
         return "empty"
     accepted = index[picture.continuous(index, settings.most_jump)]
     if not accepted.size:
         return "no_depth"
     box = hull_of(picture.points(accepted))
-    behind = settings.hidden.get(segment.class_id, 0.0)
-    box = replace(box, zmax=box.zmax + behind)
     return Grounded(segment.class_id, segment.probability, box, accepted.size)
 
 
-def body_of(segment: Segment, settings: Grounding = DEFAULT) -> Mask:
-    """The segment's mask without its fringe (M_eroded); shape (height, width)."""
-    mask = read_mask(segment.bits, segment.width, segment.height)
-    cross = settings.cross(segment.class_id, segment.width)
-    return eroded(mask, cross, settings.iterations, settings.rim)
-
-
-def to_detection(
-    found: Grounded, mount: Mount, robot: Pose2D | None = None
-) -> Detection:
-    """P_work = T · P_sensor: the box in ``base_link``, or in ``map`` given a pose.
-
-    The box is the hull of the turned one, so its centre is the turned centre.
-
-    Args:
-        found: In the camera's optical frame.
-        mount: Of the camera in ``base_link``.
-        robot: Pose of ``base_link`` in ``map`` when the picture was taken.
-    """
-    sensor = mount.pose if robot is None else robot.compose(mount.pose)
-    box = hull_of(_to_work(corners_of(found.box), sensor, mount.height))
-    frame: Literal["map", "base_link"] = "base_link" if robot is None else "map"
-    return Detection(found.class_id, found.probability, box, frame)
-
-
 def frame_of(
-    robot_id: str,
-    origin: Origin,
     answers: Sequence[tuple[str | None, Detection | Ungrounded]],
 ) -> DetectionFrame:
     """The detection frame of all targets of a picture, each with its class.
@@ -427,14 +347,7 @@ def frame_of(
         for class_id, one in answers
         if one != "unsure" and not isinstance(one, Detection)
     )
-    return DetectionFrame(robot_id, origin, found, lost)
-
-
-def _examine(segment: Segment) -> None:
-    if not 0.0 <= segment.probability <= 1.0:
-        raise UnreadableError("bad_probability", f"{segment.probability}")
-    if not (math.isfinite(segment.x_c) and math.isfinite(segment.y_c)):
-        raise UnreadableError("bad_centre", f"{segment.x_c}, {segment.y_c}")
+    return DetectionFrame("", UNKNOWN_ORIGIN, found, lost)
 
 
 def hull_of(points: Floats) -> Box3D:
@@ -447,12 +360,3 @@ def corners_of(box: Box3D) -> Floats:
     """The corners of a box, shape (8, 3)."""
     sides = (box.xmin, box.xmax), (box.ymin, box.ymax), (box.zmin, box.zmax)
     return np.stack(np.meshgrid(*sides), axis=-1).reshape(8, 3)
-
-
-def _to_work(points: Floats, sensor: Pose2D, height: float) -> Floats:
-    """Optical frame (z forward, x right, y down) to REP-103 (z up), turned."""
-    right, down, ahead = points.T
-    c, s = math.cos(sensor.yaw), math.sin(sensor.yaw)
-    x = sensor.x + c * ahead + s * right
-    y = sensor.y + s * ahead - c * right
-    return np.stack((x, y, height - down), axis=1)

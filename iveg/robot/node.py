@@ -3,7 +3,6 @@
 import asyncio
 import itertools
 import logging
-import math
 import secrets
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -42,7 +41,7 @@ from iveg.robot.holds import read_holds, write_holds
 from iveg.robot.judgement import Limits, OnLinkLoss
 from iveg.robot.orders import Drive, Effect, Persist, Report, SendAnswer
 from iveg.robot.safety import SafetyMachine, State
-from iveg.robot.uplink import Form, SafetyLane, Uplink
+from iveg.robot.uplink import Form, Origins, SafetyLane, Uplink
 
 # --- pacing -----------------------------------------------------------------------
 #
@@ -75,13 +74,11 @@ async def in_slots(period: float, work: Sequence[Callable[[float], None]]) -> No
 
 
 # --- node settings ----------------------------------------------------------------
-#
-# Settings that the safety nodes of a run share.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NodeSettings:
-    """Settings shared by the safety nodes of a run.
+    """Settings of a safety node.
 
     Attributes:
         address: The broker.
@@ -92,6 +89,10 @@ class NodeSettings:
         on_link_loss: ``slow``: it goes on at half speed instead.
         uplink: One message a topic, or Algorithm 1's single payload.
         plan: What stands in the greenhouse; None: nobody drew it.
+        replay: It plays a recording, which is in this map frame: its messages are
+            marked, and echo no feedback, since their content was measured long ago.
+        read_clock: The robot's own clocks.
+        open_link: Opens its link to the broker.
     """
 
     address: BrokerAddress
@@ -102,6 +103,9 @@ class NodeSettings:
     on_link_loss: OnLinkLoss = "stop"
     uplink: Form = "per-topic"
     plan: Plan | None = None
+    replay: str | None = None
+    read_clock: Callable[[], Instant] = clock.now
+    open_link: Callable[[BrokerAddress, str], MqttLink] = MqttLink
 
 
 # --- node -------------------------------------------------------------------------
@@ -123,16 +127,11 @@ class RobotNode:
 
     Args:
         robot_id: This robot.
-        settings: Those of all robots of the run.
-        profile: Speeds of the drive.
+        settings: Its broker, files and waiting times.
+        profile: Its body, and speeds of the drive.
         drive: Takes what the gate lets through; must not block.
-        held: No crew is at the robot at start: ``release_locally`` has no effect
-            before ``run``.
-        replay: It plays a recording, which is in this map frame: its messages are
-            marked, and echo no feedback, since their content was measured long ago.
-        on_feedback: Called with the topic's robot and each feedback that could be read.
         navigate: Takes goals of iVeg; None: the robot takes none.
-        read_clock: The robot's own clocks.
+        on_feedback: Called with the topic's robot and each feedback that could be read.
     """
 
     def __init__(
@@ -142,85 +141,74 @@ class RobotNode:
         *,
         profile: RobotProfile,
         drive: Callable[[Twist2D], None],
-        held: bool = False,
-        replay: str | None = None,
-        on_feedback: Callable[[str, Feedback], None] | None = None,
         navigate: Navigate | None = None,
-        read_clock: Callable[[], Instant] = clock.now,
-        open_link: Callable[[BrokerAddress, str], MqttLink] = MqttLink,
+        on_feedback: Callable[[str, Feedback], None] | None = None,
     ) -> None:
-        self._read_clock = read_clock
-        self.boot = secrets.token_hex(4)
         self._id, self._drive = robot_id, drive
+        self._read_clock = settings.read_clock
         self._started = self._read_clock().mono
         self._on_feedback_read = on_feedback
-        self._faults: tuple[RobotFault, ...] = ()
         self._on_peer_scan: Callable[[str, bytes], None] | None = None
-        self._is_replay = replay is not None
-        self._asks_for_scans, self._nobody_there = False, held
+        self._asks_for_scans = False
+        self._faults: tuple[RobotFault, ...] = ()
         self._loop: asyncio.AbstractEventLoop | None = None
+        self._broken: asyncio.Future[None] | None = None
+        self._next_tick: asyncio.TimerHandle | None = None
         self._commanded: tuple[Twist2D, float] = REST, 0.0
         self._goals = RobotGoals(robot_id, navigate)
         self._placed: tuple[Pose2D | None, float] = None, 0.0
         """Newest pose, and when it came (monotonic, s)."""
-        self._broken: asyncio.Future[None] | None = None
-        self._next_tick: asyncio.TimerHandle | None = None
         self._command_topic = names.command_topic(settings.apikey, robot_id)
         self._desired_topic = names.DESIRED_TOPIC.format(robot_id=robot_id)
-        self._link = open_link(settings.address, f"robot {robot_id}")
-        self._attach(self._subscriptions())
+        self._is_replay = settings.replay is not None
+        self._link = settings.open_link(settings.address, f"robot {robot_id}")
+        self._subscribe()
         hold_file = settings.directory / f"{robot_id}.holds.json"
         self._lane = SafetyLane(
             partial(write_holds, hold_file), partial(self._link.publish, qos=1)
         )
-        self._uplink = self._new_uplink(settings, replay)
-        limits = Limits(
-            profile.max_speed,
-            profile.max_turn,
-            settings.slow_s,
-            settings.stand_s,
-            settings.on_link_loss,
-            Outline(profile.length, profile.width),
-            settings.plan,
-            profile.braking,
+        stored = read_holds(hold_file)
+        if stored is None:
+            _log.warning("%s: unreadable hold file, held: %s", robot_id, hold_file)
+        boot = secrets.token_hex(4)
+        origins = Origins(
+            boot,
+            1 + secrets.randbelow(2**31),
+            echoes=None if self._is_replay else self._echoes,
+            replay=settings.replay,
         )
-        self._machine = self._new_machine(hold_file, limits)
-        self._heard_at = -math.inf
-
-    def _new_uplink(self, settings: NodeSettings, replay: str | None) -> Uplink:
-        return Uplink(
-            self._id,
+        self._uplink = Uplink(
+            robot_id,
             settings.apikey,
-            self.boot,
+            origins,
             self._link.enqueue,
             form=settings.uplink,
-            first_report=1 + secrets.randbelow(2**31),
-            echoes=self._echoes if replay is None else None,
-            replay=replay,
         )
+        self._machine = SafetyMachine(
+            robot_id,
+            boot,
+            self._started,
+            stored=stored,
+            fresh=partial(secrets.token_hex, 8),
+            limits=Limits(
+                profile.max_speed,
+                profile.max_turn,
+                settings.slow_s,
+                settings.stand_s,
+                settings.on_link_loss,
+                Outline(profile.length, profile.width),
+                settings.plan,
+                profile.braking,
+            ),
+        )
+
+    def _subscribe(self, **more: int) -> None:
+        own = self._command_topic, self._desired_topic, names.FEEDBACK_FILTER
+        topics = dict.fromkeys(own, 1) | more
+        self._link.attach(topics, self._on_message, on_stored=self._on_stored)
 
     def _echoes(self) -> tuple[FeedbackRef, ...]:
         return self._machine.authors.echoes(self._read_clock().mono)
-
-    def _attach(self, topics: dict[str, int]) -> None:
-        self._link.attach(topics, self._on_message, on_stored=self._on_stored)
-
-    def _subscriptions(self) -> dict[str, int]:
-        own = self._command_topic, self._desired_topic
-        return dict.fromkeys((*own, names.FEEDBACK_FILTER), 1)
-
-    def _new_machine(self, hold_file: Path, limits: Limits) -> SafetyMachine:
-        stored = read_holds(hold_file)
-        if stored is None:
-            _log.warning("%s: unreadable hold file, held: %s", self._id, hold_file)
-        return SafetyMachine(
-            self._id,
-            self.boot,
-            self._read_clock().mono,
-            stored=stored,
-            fresh=partial(secrets.token_hex, 8),
-            limits=limits,
-        )
 
     # --- state for upstream -------------------------------------------------------
 
@@ -262,7 +250,6 @@ class RobotNode:
 
     async def run(self) -> None:
         """Run until cancelled; the drive is left at rest."""
-        self._nobody_there = False
         try:
             async with asyncio.TaskGroup() as tasks:
                 for name, work in (
@@ -316,7 +303,7 @@ class RobotNode:
     def hear_peer_scans(self, on_scan: Callable[[str, bytes], None]) -> None:
         """Hand on scans of peers as they come, by topic; call it before ``run``."""
         self._on_peer_scan = on_scan
-        self._attach({**self._subscriptions(), names.PEER_SCAN_FILTER: 0})
+        self._subscribe(**{names.PEER_SCAN_FILTER: 0})
 
     def ask_for_peer_scans(self, wanted: bool) -> None:
         """Have the next reports ask iVeg for scans of peers, or no longer."""
@@ -329,9 +316,8 @@ class RobotNode:
 
     def release_locally(self) -> None:
         """Lift boot, button and bumper holds and resume, for the crew at the robot."""
-        if not self._nobody_there:
-            now = self._read_clock().mono
-            self._perform(self._machine.release_locally(now), now)
+        now = self._read_clock().mono
+        self._perform(self._machine.release_locally(now), now)
 
     async def _tick_forever(self) -> None:
         """Tick whenever the drive got no command for 40 ms."""
@@ -383,7 +369,6 @@ class RobotNode:
             feedback = read_feedback(payload)
         except UnreadableError:
             return  # Counts as no feedback: the watchdog does the rest.
-        self._heard_at = now
         peer = topic.removeprefix("/").partition("/")[0]
         self._perform(self._machine.feedback(peer, feedback, now), now)
         self._uplink.rates.note_backlog(self._machine.authors.backlog_s(), now)

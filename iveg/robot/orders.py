@@ -1,6 +1,6 @@
 """Orders to the safety machine, the effects that it asks for, and its answers."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, ValidationError
@@ -202,20 +202,3 @@ ATTEMPTS_KEPT = 64
 
 Verdict = tuple[str | None, AnswerCode, str | None]
 """On a release or resume: the hold that the answer names, and why it was refused."""
-
-
-@dataclass(slots=True)
-class Verdicts:
-    """By attempt, oldest first."""
-
-    _of: dict[str, Verdict] = field(default_factory=dict)
-
-    def on(self, attempt: str) -> Verdict | None:
-        """The answer given; None: the attempt is new."""
-        return self._of.get(attempt)
-
-    def keep(self, attempt: str, verdict: Verdict) -> None:
-        """Remember an answer; the oldest gives way."""
-        self._of[attempt] = verdict
-        if len(self._of) > ATTEMPTS_KEPT:
-            del self._of[next(iter(self._of))]

@@ -68,7 +68,7 @@ class PeerObserver:
             now: Monotonic (s).
         """
         age = now - self.at
-        if age > LIMITS.ring_lasts_s or (self.stands and age <= LIMITS.silence_s):
+        if age > LIMITS.zone_lasts_s or (self.stands and age <= LIMITS.silence_s):
             return FREE
         zone_m = grown_radius(radius_m, age) + beyond
         near = own.distance_to(self.pose.x, self.pose.y) <= zone_m
@@ -113,12 +113,12 @@ class RuleRadii:
         """
         told = self._told.get(class_)
         if not told:
-            return LIMITS.ring_default_m
+            return LIMITS.zone_default_m
         return next((one[1] for one in told if _counts(one, now)), told[-1][1])
 
 
 def _counts(told: tuple[float, float], now: float) -> bool:
-    return now - told[0] <= LIMITS.ring_lasts_s
+    return now - told[0] <= LIMITS.zone_lasts_s
 
 
 @dataclass(slots=True)
@@ -138,7 +138,7 @@ def is_alive(kept: KeptAlert, topic: PeerTopic, now: float) -> bool:
     """Whether an alert still counts: recent, and not superseded on its topic."""
     missing = kept.missing_since
     moved_on = missing is not None and topic.at - missing >= MOVED_ON_S
-    return not moved_on and now - kept.at <= LIMITS.ring_lasts_s
+    return not moved_on and now - kept.at <= LIMITS.zone_lasts_s
 
 
 def alerts_of(feedback: Feedback) -> dict[AlertKey, FeedbackAlert]:

@@ -34,6 +34,7 @@ from iveg.robot.gate import Cap, Gate
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import DEFAULT_LIMITS, Judgement, Limits
 from iveg.robot.orders import (
+    ATTEMPTS_KEPT,
     AnswerCode,
     Drive,
     Effect,
@@ -44,7 +45,6 @@ from iveg.robot.orders import (
     SendAnswer,
     StopOrder,
     Verdict,
-    Verdicts,
     read_desired_state,
     read_order,
 )
@@ -91,7 +91,7 @@ class SafetyMachine:
         self._resumed = False
         self._resumed_by: str | None = None
         self._challenge, self._challenge_at = fresh(), now
-        self._verdicts = Verdicts()
+        self._verdicts: dict[str, Verdict] = {}
         self._holds = (stored or HoldSet()).after_reboot()
         self._persisted: HoldSet | None = None
         self._said: tuple[Cap, HoldSet, str, bool] | None = None
@@ -252,13 +252,15 @@ class SafetyMachine:
 
     def _attempt(self, order: ReleaseOrder | ResumeOrder, now: float) -> CommandAnswer:
         """Judge the first copy of an order; give every other the same answer."""
-        verdict = self._verdicts.on(order.attempt)
+        verdict = self._verdicts.get(order.attempt)
         if verdict is None:
             if isinstance(order, ReleaseOrder):
                 verdict = self._release(order, now)
             else:
                 verdict = self._resume(order, now)
-            self._verdicts.keep(order.attempt, verdict)
+            self._verdicts[order.attempt] = verdict
+            if len(self._verdicts) > ATTEMPTS_KEPT:
+                del self._verdicts[next(iter(self._verdicts))]
         return self._answer(*verdict, attempt=order.attempt)
 
     def _release(self, order: ReleaseOrder, now: float) -> Verdict:

@@ -1,26 +1,20 @@
 """Plain CDR, the bytes of a ROS 2 message in both byte orders, by rosbags.
 
-rosbags has the definitions of ROS 2 Jazzy.  It is told those of detectors, and to make
-messages of ours.  Arrays that are read are views of the payload, sequences are lists.
+Arrays that are read are views of the payload, sequences are lists.
 """
 
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import fields
 from functools import cache
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Any
 
 from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from iveg.domain.errors import UnreadableError
-from iveg.ros2.detector_messages import NUMBERED, TEXTS
 from iveg.ros2.messages import Message, definitions
 
-_M = TypeVar("_M", bound=Message)
 
-
-def read(message: type[_M], payload: bytes) -> _M:
+def read(message: type[Message], payload: bytes) -> Any:
     """Read one message, after which up to three bytes of padding may come.
 
     Args:
@@ -32,46 +26,18 @@ def read(message: type[_M], payload: bytes) -> _M:
     """
     for form in definitions(message):
         with suppress(SerdeError):
-            found: Any = store_of(form).deserialize_cdr(memoryview(payload), form.ROS)
-            if form is not message:
-                found = message(*(getattr(found, one.name) for one in fields(message)))
-            made: _M = found
-            return made
+            found = form.STORE.deserialize_cdr(memoryview(payload), form.ROS)
+            if form is message:
+                return found
+            kind: Any = message
+            return kind(*(getattr(found, one.name) for one in fields(kind)))
     raise UnreadableError("unreadable", f"{message.ROS} of {len(payload)} bytes")
 
 
 def write(message: Message) -> bytes:
     """The bytes of one message, with its encapsulation; the lowest comes first."""
-    store = store_of(type(message))
-    return bytes(store.serialize_cdr(message, message.ROS, little_endian=True))
-
-
-@cache
-def store_of(message: type[Message]) -> Any:
-    """The definitions of a message and of all within it, ready for its bytes."""
-    kinds = {one.ROS: one for one in _within(message)}
-    store = _store(any(one.__name__ == NUMBERED for one in kinds.values()))
-    store.types.update(kinds)
-    # Codecs take a tenth of a second, which no twist should wait for.
-    store.get_msgdef(message.ROS)
-    return store
-
-
-@cache
-def _store(numbered: bool) -> Any:
-    store = get_typestore(Stores.ROS2_JAZZY)
-    for name, text in TEXTS[numbered].items():
-        store.register(get_types_from_msg(text, name))
-    return store
-
-
-def _within(message: type[Message]) -> Iterator[type[Message]]:
-    """A message and those within it."""
-    yield message
-    for hint in get_type_hints(message).values():
-        for kind in (hint, *get_args(hint)):
-            if isinstance(kind, type) and issubclass(kind, Message):
-                yield from _within(kind)
+    written = message.STORE.serialize_cdr(message, message.ROS, little_endian=True)
+    return bytes(written)
 
 
 # --- type hash --------------------------------------------------------------------
@@ -85,7 +51,7 @@ _HASH, _GATE = "typehash", "iveggate"
 @cache
 def type_hash(message: type[Message]) -> str:
     """``RIHS01_`` and 64 hexadecimal digits."""
-    return str(store_of(message).hash_rihs01(message.ROS))
+    return str(message.STORE.hash_rihs01(message.ROS))
 
 
 def user_data(message: type[Message], gate: str = "") -> bytes:

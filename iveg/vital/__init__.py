@@ -1,1 +1,1 @@
-"""What a speed limit or a STOP needs: observations enter, feedback, orders and alerts leave."""
+"""What a limit or a STOP needs: observations in; feedback, orders and alerts out."""

@@ -14,10 +14,9 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import DetectionFrame, Instant, Received, SafetyReport
 from iveg.domain.robot_state import RobotState
 from iveg.domain.stream_order import OrderVerdict
-from iveg.domain.tracking.blind import BlindCameras
 from iveg.domain.tracking.people import People, Placed
 from iveg.domain.tracking.person import TrackedPerson
-from iveg.domain.tracking.sight import Look, OwnSight
+from iveg.domain.tracking.sight import BlindCameras, Look, OwnSight
 from iveg.domain.words import HeardWords, meaning_of, name_numbers, plain
 from iveg.domain.world import World
 from iveg.vital import topics
@@ -100,7 +99,7 @@ class DetectionTracking:
         detector, has_pose = robot.detector, robot.odometry is not None
         seen_at = robot.sighted_at or received.at
         late = verdict == "late" and not received.asked
-        protects = late and received.at.mono - seen_at.mono <= LIMITS.ring_lasts_s
+        protects = late and received.at.mono - seen_at.mono <= LIMITS.zone_lasts_s
         if verdict != "new" and not protects:
             return
         if not detector.admits_frame(received.at):
@@ -249,7 +248,7 @@ class DetectionTracking:
             self._logged_at = {
                 key: at
                 for key, at in self._logged_at.items()
-                if now.mono - at < LIMITS.ring_lasts_s
+                if now.mono - at < LIMITS.zone_lasts_s
             }
 
 

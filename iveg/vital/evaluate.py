@@ -127,8 +127,8 @@ class Evaluator:
         return self._speed_limits.entries
 
     def encounters(self, robot_id: str, now: Instant) -> Sequence[Encounter]:
-        """Rings that a robot will reach, the soonest first; forecasts grow old, too."""
-        ahead = self._speed_limits.encounters_told(robot_id).values()
+        """Zones that a robot will reach, the soonest first; forecasts grow old, too."""
+        ahead = self._speed_limits.encounters.get(robot_id, {}).values()
         young = (one for one in ahead if now.mono - one.at <= LIMITS.silence_s)
         return sorted(young, key=lambda one: one.in_s)
 

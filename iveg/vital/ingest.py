@@ -9,6 +9,7 @@ dropped counts as one that could not be read: somebody may have been in it.
 
 import asyncio
 import logging
+import math
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -70,6 +71,8 @@ class Ingest:
         """Of what waits and was counted by its sender."""
         self._waiting: Counter[_Stream] = Counter()
         """How much waits, by robot and kind."""
+        self._due: dict[_Stream, float] = {}
+        """When the next of a robot and kind is read directly (monotonic, s)."""
         self._first: dict[tuple[str, type[Observation], str | None], int] = {}
         """By robot, kind and boot: the count of the first, until another came."""
         self._wake = asyncio.Event()
@@ -141,11 +144,31 @@ class Ingest:
         return (seq or 0) <= first
 
     def is_past(
-        self, robot_id: str, kind: type[Observation], boot: str, seq: int
+        self,
+        robot_id: str,
+        kind: type[Observation],
+        boot: str,
+        seq: int,
+        now: float = math.inf,
     ) -> bool:
-        """Whether a message cannot be news: it is here, or a later one was taken."""
-        waits = (robot_id, kind, boot, seq) in self._identities
-        return waits or self._is_past(robot_id, kind, boot, seq)
+        """Whether a message cannot be news: it is here, or a later one was taken.
+
+        Nor is it what comes too soon after a direct one of a kind that is only drawn
+        (``now`` monotonic, s).
+        """
+        return (
+            (robot_id, kind, boot, seq) in self._identities
+            or now < self._due.get((robot_id, kind), 0.0)
+            or self._is_past(robot_id, kind, boot, seq)
+        )
+
+    def is_early(self, robot_id: str, kind: type[Observation], now: float) -> bool:
+        """Whether nobody would look at it: one of its kind was read a moment ago."""
+        apart_s = KIND_OF[kind].apart_s
+        if apart_s and now < self._due.get((robot_id, kind), 0.0):
+            return True
+        self._due[robot_id, kind] = now + apart_s
+        return False
 
     def reject(self, source: str, reason: str, detail: str = "") -> None:
         """Count something that cannot be used; say so once for each source."""

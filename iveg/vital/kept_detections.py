@@ -84,7 +84,7 @@ class KeptDetections:
             self._kept_at = {
                 key: at
                 for key, at in self._kept_at.items()
-                if now.mono - at < LIMITS.ring_lasts_s
+                if now.mono - at < LIMITS.zone_lasts_s
             }
             self._looks = {
                 key: looks for key, looks in self._looks.items() if key in self._kept_at

@@ -35,6 +35,7 @@ class BoundedHttp(HttpToolsProtocol):
     most = MOST
     head_s = HEAD_S
     _timer: asyncio.TimerHandle | None = None
+    _lacks_head = True
     _held = 0
 
     def connection_made(  # type: ignore[override]
@@ -42,6 +43,7 @@ class BoundedHttp(HttpToolsProtocol):
     ) -> None:
         """Somebody has connected."""
         super().connection_made(transport)
+        self.table[self] = None
         self._await_head()
         if len(self.table) > self.most:
             idle = (one for one in self.table if one.is_idle and one is not self)
@@ -58,15 +60,20 @@ class BoundedHttp(HttpToolsProtocol):
         super().data_received(data)
         if self._held > MOST_HELD:
             self.give_way()
+        elif self._lacks_head:
+            self._await_head()
 
     def on_message_begin(self) -> None:
         """A request begins."""
         super().on_message_begin()
-        self._await_head()
+        self._lacks_head = True
+        self._leave()
+        self.table[self] = None
 
     def on_headers_complete(self) -> None:
         """The head is here."""
         self._held = 0
+        self._lacks_head = False
         self._end_timer()
         super().on_headers_complete()
 
@@ -97,9 +104,9 @@ class BoundedHttp(HttpToolsProtocol):
         self.transport.abort()
 
     def _await_head(self) -> None:
-        self._leave()
-        self.table[self] = None
-        self._timer = self.loop.call_later(self.head_s, self.give_way)
+        """Bound the time of a head that has not come whole; more bytes prolong none."""
+        if self._timer is None:
+            self._timer = self.loop.call_later(self.head_s, self.give_way)
 
     def _leave(self) -> None:
         self.table.pop(self, None)
@@ -108,6 +115,7 @@ class BoundedHttp(HttpToolsProtocol):
     def _end_timer(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
+            self._timer = None
 
 
 def bounded_http(most: int = MOST, head_s: float = HEAD_S) -> type[BoundedHttp]:

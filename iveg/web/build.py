@@ -161,5 +161,4 @@ def build_app(
     app.add_middleware(SignInGate, clock=clock)
     # Last is outermost: a refusal carries the headers, too.
     app.add_middleware(headers.SecurityHeaders)
-    app.add_middleware(notifications.NotificationsFirst, endpoint=face.orion)
     return app

@@ -61,11 +61,7 @@ class SoilMoisture(Observation):
 
 from iveg.domain.observations import SoilMoisture
 
-@dataclass(frozen=True, slots=True)
-class Float32(Message, package="std_msgs"):
-    \"\"\"Per cent.\"\"\"
-
-    data: float = 0.0
+Float32: Any = ros.message("std_msgs/msg/Float32")
 
 
 def read_moisture(message: Float32) -> SoilMoisture:
@@ -114,13 +110,13 @@ from iveg.domain.world import World
 from iveg.models.robot import Device
 from iveg.models.robot import Robot
 from iveg.ngsi import codec, names
-from iveg.robot.uplink import Uplink
+from iveg.robot.uplink import Origins, Uplink
 from tests.unit.vital.desk import Desk, conditions_of
 import asyncio
 
 sent = {}
 for form in ("per-topic", "single"):
-    uplink = Uplink("AGI", "iveg", "boot", sent.__setitem__, form=form)
+    uplink = Uplink("AGI", "iveg", Origins("boot"), sent.__setitem__, form=form)
     uplink.send(SoilMoisture("", codec.read_measure, 12.5), Instant(1.0, 1.7e9))
     ((topic, payload),) = sent.items()
     assert topic == "/iveg/AGI_soil_moisture/attrs", topic

@@ -23,7 +23,7 @@ def message_bag(
         for topic, message, at in said:
             if topic not in topics:
                 topics[topic] = writer.add_connection(
-                    topic, message.ROS, typestore=store or cdr.store_of(type(message))
+                    topic, message.ROS, typestore=store or message.STORE
                 )
             writer.write(topics[topic], round(at * 1e9), cdr.write(message))
     return path

@@ -145,10 +145,9 @@ def make_robot(address: BrokerAddress, folder: Path) -> Robot:
     driven = [(now().mono, Twist2D(0.0, 0.0))]
     node = RobotNode(
         "AGI",
-        NodeSettings(address=address, apikey="iveg", directory=folder),
+        NodeSettings(address=address, apikey="iveg", directory=folder, read_clock=now),
         profile=RobotProfile(),
         drive=lambda twist: driven.append((now().mono, twist)),
-        read_clock=now,
     )
     return Robot(node, driven, now)
 

@@ -236,24 +236,6 @@ export function snapshot(changes = {}) {
 }
 
 /**
- * A scan frame as the server writes it.
- *
- * @param {Record<string, unknown>} head
- * @param {number[]} points x, y, x, y … (m)
- * @returns {ArrayBuffer}
- */
-export function scanFrame(head, points) {
-  const words = new TextEncoder().encode(JSON.stringify(head));
-  const length = Math.ceil(words.length / 4) * 4;
-  const bytes = new ArrayBuffer(4 + length + 4 * points.length);
-  new DataView(bytes).setUint32(0, length, true);
-  new Uint8Array(bytes, 4, length).fill(32);
-  new Uint8Array(bytes, 4, length).set(words);
-  new Float32Array(bytes, 4 + length).set(points);
-  return bytes;
-}
-
-/**
  * A frame of telemetry as the server writes it.
  *
  * @param {{frame: number, parts?: unknown[], moves?: unknown[], scans?: unknown[]}} head

@@ -1,14 +1,5 @@
-import {
-  aboutAge,
-  ageOf,
-  createServerClock,
-  linkOf,
-} from "../../iveg/static/js/core/clock.js";
+import { ageOf, createServerClock, linkOf } from "../../iveg/static/js/core/clock.js";
 import { equal, near, test } from "./harness.js";
-
-test("an age is what the server said plus the wait since it arrived", () => {
-  near(ageOf({ age_s: 0.4, receivedAtMs: 1000 }, 2500), 1.9);
-});
 
 test("a value that was never heard is infinitely old and its link unknown", () => {
   equal(linkOf(ageOf({ age_s: null, receivedAtMs: 0 }, 0)), "UNKNOWN");
@@ -19,15 +10,6 @@ test("silence alone makes a robot late after one second and lost after three", (
   const robot = { age_s: 0, receivedAtMs: 0 };
   const links = [1000, 1001, 3000, 3001].map((ms) => linkOf(ageOf(robot, ms)));
   equal(links, ["LIVE", "LATE", "LATE", "LOST"]);
-});
-
-test("an age that is only estimated is marked", () => {
-  /** @type {(key: string, slots: {said: string}) => string} */
-  const t = (key, slots) => `${key}: ${slots.said}`;
-  const said = [{ age_estimated: true }, { age_estimated: false }, {}, undefined].map(
-    (robot) => aboutAge(robot, "0.3 s", { t }),
-  );
-  equal(said, ["robot.age_about: 0.3 s", "0.3 s", "0.3 s", "0.3 s"]);
 });
 
 test("the server's clock is read from the quickest of the last answers", () => {

@@ -1,5 +1,4 @@
-import { createI18n, translate } from "../../iveg/static/js/core/i18n.js";
-import { laneName } from "../../iveg/static/js/core/lanes.js";
+import { createI18n } from "../../iveg/static/js/core/i18n.js";
 import { equal, test } from "./harness.js";
 
 const BLOCKS = {
@@ -35,35 +34,6 @@ test("numbers, shares, classes and times are written as Spaniards do", async () 
   equal(
     t("d", slots).replaceAll("\u00a0", " "),
     "a 1,4 m (94 %), una persona, 13:04:11",
-  );
-});
-
-test("markup in a value stays text", async () => {
-  const { t } = await words("es");
-  const place = document.createElement("div");
-  const line = document.createElement("p");
-  line.dataset.i18n = "plain";
-  line.dataset.slots = JSON.stringify({ a: "<img src=x>", b: "$&" });
-  place.append(line);
-  translate(place, t);
-  equal(line.childElementCount, 0);
-  equal(line.textContent, "<img src=x> y $&");
-});
-
-test("a lane that iVeg named is named in the reader's words", () => {
-  /** @param {string} key @param {Record<string, string>} [slots] */
-  const t = (key, slots) => `${key} ${slots?.n}`.trim();
-  equal(
-    ["Pasillo 1", "12", "Pasillo 3 sur", "Pasillo central", "Cabecera norte"].map(
-      (label) => laneName(label, t),
-    ),
-    [
-      "lane.number 1",
-      "lane.number 12",
-      "lane.number_south 3",
-      "lane.central",
-      "lane.end_north",
-    ],
   );
 });
 

@@ -1,10 +1,9 @@
-import { installPaintHook } from "../../iveg/static/js/core/painthook.js";
 import { Store } from "../../iveg/static/js/core/store.js";
 import { createMap } from "../../iveg/static/js/map/map.js";
 import { detection, person, robot, snapshot } from "./builders.js";
 import { equal, test } from "./harness.js";
 
-/** A map of 600 × 400 px on the page, its store, and what it said it painted. */
+/** A map of 600 × 400 px on the page, and its store. */
 function mapOnPage(options = {}) {
   const canvas = document.createElement("canvas");
   canvas.style.width = "600px";
@@ -12,12 +11,7 @@ function mapOnPage(options = {}) {
   document.body.replaceChildren(canvas);
   const store = new Store();
   const map = createMap(canvas, store, { storage: null, ...options });
-  installPaintHook(store, map);
-  /** @type {{robot: string, kind: string, stamp: string}[]} */
-  const painted = [];
-  /** @type {any} */ (globalThis).__onPaint = (/** @type {any} */ it) =>
-    painted.push(it);
-  return { canvas, store, map, painted };
+  return { canvas, store, map };
 }
 
 const frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
@@ -39,28 +33,6 @@ function point(target, type, x, y, pointerId = 1) {
   const place = { clientX: left + x, clientY: top + y, pointerId, bubbles: true };
   target.dispatchEvent(new PointerEvent(type, place));
 }
-
-test("a message is painted in the next frame and told with its own stamp", async () => {
-  const { store, map, painted } = mapOnPage();
-  store.apply("snapshot", snapshot());
-  await frame();
-  painted.length = 0;
-  store.apply("robots/AGI", robot({ stamp: "odd stamp 1" }));
-  const points = new Float32Array([1, 2]);
-  const sweep = { robot_id: "AGI", stamp: "s2", age_s: 0, points };
-  store.apply("robots/AGI/scan", sweep);
-  const items = [detection()];
-  const look = { robot_id: "AGI", stamp: "s3", items };
-  store.apply("detections/AGI", look);
-  equal(painted, []);
-  await frame();
-  equal(painted, [
-    { robot: "AGI", kind: "odom", stamp: "odd stamp 1" },
-    { robot: "AGI", kind: "lidar", stamp: "s2" },
-    { robot: "AGI", kind: "detection", stamp: "s3" },
-  ]);
-  map.destroy();
-});
 
 test("every layer shows, and its switch takes it off the picture", async () => {
   const { canvas, store, map } = mapOnPage();

@@ -32,10 +32,6 @@ const order = (differs = {}) =>
     ...differs,
   });
 
-test("a whole chain is said to work", () => {
-  equal(judgeDataPath(hops({}), LIVE, true).key, "fleet.whole");
-});
-
 test("of several broken hops the one nearest to the robots is named", () => {
   const found = judgeDataPath(
     hops({ notifications: "down", iot_agent: "down" }),
@@ -46,10 +42,6 @@ test("of several broken hops the one nearest to the robots is named", () => {
   equal(found.hop, "iot_agent");
 });
 
-test("a dead broker explains silent robots", () => {
-  equal(judgeDataPath(hops({ mqtt: "down" }), [LOST], true).hop, "mqtt");
-});
-
 test("each transport is measured from the press on, and silence is no number", () => {
   equal(tookOf(order(), ["direct", "fiware", "dds"]), {
     accepted: null,
@@ -57,19 +49,6 @@ test("each transport is measured from the press on, and silence is no number", (
     answer: [null, 50, null],
     standing: 412,
   });
-});
-
-test("13.7: a STOP pressed while the server was dead has one zero: the press", () => {
-  const { times } = order();
-  const took = tookOf(
-    order({
-      times: { ...times, pressed: "2026-11-20T11:59:20.000Z" },
-      standstill_ms: 40412,
-    }),
-    ["direct", "fiware"],
-  );
-  equal([took.accepted, took.sent[0], took.answer[1]], [40000, 40002, 40050]);
-  equal(took.standing, 40412);
 });
 
 test("13.5 a chain that nobody has heard of, or without robots, is not said to work", () => {

@@ -1,5 +1,4 @@
 import { createPresser } from "../../iveg/static/js/panels/press.js";
-import { onPress } from "../../iveg/static/js/panels/stop_gesture.js";
 import { equal, test } from "./harness.js";
 import { memory } from "./memory.js";
 
@@ -69,67 +68,6 @@ test("a press is repeated under one id until the server has it", async () => {
   await presser.press("AGI");
   equal(ids.length, 3);
   equal(new Set(ids).size, 1);
-});
-
-/** A control and the number of presses that it has told. */
-function control() {
-  const button = document.createElement("button");
-  const told = { count: 0 };
-  document.body.append(button);
-  onPress(button, () => {
-    told.count += 1;
-  });
-  return { button, told };
-}
-
-/** @param {HTMLElement} on @param {string} type */
-const pointer = (on, type) =>
-  on.dispatchEvent(new PointerEvent(type, { bubbles: true, button: 0 }));
-
-/** @param {HTMLElement} on @param {string} key @param {boolean} [repeat] */
-const key = (on, key, repeat = false) =>
-  on.dispatchEvent(
-    new KeyboardEvent("keydown", { key, repeat, bubbles: true, cancelable: true }),
-  );
-
-test("a finger presses when it comes down, and once", () => {
-  const { button, told } = control();
-  pointer(button, "pointerdown");
-  equal(told.count, 1);
-  pointer(button, "pointerup");
-  button.click();
-  equal(told.count, 1);
-});
-
-test("a click without a finger, as assistive tools make it, presses", () => {
-  const { button, told } = control();
-  button.click();
-  equal(told.count, 1);
-});
-
-test("Enter and Space press once however long they are held", () => {
-  const { button, told } = control();
-  key(button, "Enter");
-  key(button, "Enter", true);
-  key(button, " ");
-  key(button, " ", true);
-  equal(told.count, 2);
-});
-
-test("the right mouse button does not press", () => {
-  const { button, told } = control();
-  button.dispatchEvent(new PointerEvent("pointerdown", { button: 2 }));
-  equal(told.count, 0);
-});
-
-test("every new touch is a new press", () => {
-  const { button, told } = control();
-  for (let n = 0; n < 3; n += 1) {
-    pointer(button, "pointerdown");
-    pointer(button, "pointerup");
-    button.click();
-  }
-  equal(told.count, 3);
 });
 
 test("13.12 a press that nobody took survives a reload and is sent as the same STOP", async () => {

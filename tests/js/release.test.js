@@ -10,7 +10,7 @@ import { equal, test } from "./harness.js";
 
 const IVEG = { id: "01A", source: "iveg", ack: "remote" };
 const RED_BUTTON = { id: "hw", source: "hw", ack: "local" };
-const LINK = { id: "link", source: "link", ack: "auto" };
+const _LINK = { id: "link", source: "link", ack: "auto" };
 const STILL = { linear: 0.001, angular: 0 };
 
 /** A robot that stands, proven, held by iVeg. @param {Partial<Facts>} [changes] */
@@ -62,11 +62,6 @@ test("the robot's own red button cannot be lifted from here", () => {
   equal(whyNotRelease(facts({ robot: held })), "local_hold");
 });
 
-test("a lost link lifts by itself", () => {
-  const held = robot({ mode: "STOPPED", holds: [LINK], twist: STILL });
-  equal(whyNotRelease(facts({ robot: held })), "auto_hold");
-});
-
 test("a robot is resumed only after it reported its release", () => {
   const free = robot({ mode: "STOPPED", holds: [], twist: STILL });
   const ready = command({ kind: "stop", state: "READY" });
@@ -74,11 +69,6 @@ test("a robot is resumed only after it reported its release", () => {
   equal(whyNotResume(facts({ robot: free, command: ready })), "ok");
   equal(whyNotResume(facts({ robot: free, command: releasing })), "not_ready");
   equal(whyNotResume(facts({ command: ready })), "not_ready");
-});
-
-test("a robot that runs has nothing to resume", () => {
-  const running = robot({ mode: "RUNNING", holds: [] });
-  equal(whyNotResume(facts({ robot: running, command: undefined })), "not_ready");
 });
 
 /** Keys of what is said of a release. @param {Partial<import("../../iveg/static/js/core/protocol.js").Command>} changes */
@@ -94,9 +84,4 @@ test("a release says how it ended, and never more than the robot did", () => {
     "release.unconfirmed",
   ]);
   equal(said({ state: "REPLACED", reason: "requested" }), ["release.replaced"]);
-});
-
-test("a late IoT Agent is told with the release that went past it", () => {
-  const note = { key: "stop.note.direct", slots: { lag: 12 } };
-  equal(said({ state: "RELEASING", note }), ["release.sent", "stop.note.direct"]);
 });

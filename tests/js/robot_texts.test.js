@@ -1,6 +1,5 @@
 import { isSilent } from "../../iveg/static/js/core/clock.js";
 import { createLabels } from "../../iveg/static/js/map/layers/labels.js";
-import { detectorSaid } from "../../iveg/static/js/panels/detector.js";
 import { readingOf } from "../../iveg/static/js/panels/gauge.js";
 import { marginSaid } from "../../iveg/static/js/panels/robot_texts.js";
 import { equal, test } from "./harness.js";
@@ -58,14 +57,4 @@ test("what a restart restored has an age that nobody knows, and says so on the m
     [labels.ago(12.4), labels.ago(Number.POSITIVE_INFINITY)],
     ["map.ghost 12", "? s"],
   );
-});
-
-test("a camera is read, not read, out of service or not there", () => {
-  const said = (/** @type {object} */ detector) =>
-    detectorSaid(robot({ detector }), words);
-  const out = { out_by: null, out_since: null };
-  equal(said({ required: true, missing: false, ...out }), "detector.state.works");
-  equal(said({ required: true, missing: true, ...out }), "detector.state.missing");
-  equal(said({ required: false, missing: true, ...out }), "detector.state.none");
-  equal(detectorSaid(undefined, words), "");
 });

@@ -80,7 +80,7 @@ test("a moving robot that is not heard has one at once, growing at its last spee
   const seen = [900, 1100, 4000, 60_000].map(
     (ms) => readScene(store, ms).robots[0].unsureM,
   );
-  for (const [i, wanted] of [0, 0.88, 3.2, 0.8 * LIMITS.ring_lasts_s].entries())
+  for (const [i, wanted] of [0, 0.88, 3.2, 0.8 * LIMITS.zone_lasts_s].entries())
     near(seen[i], wanted);
 });
 

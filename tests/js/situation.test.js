@@ -1,18 +1,13 @@
 import { fleetSaid } from "../../iveg/static/js/core/fleet_said.js";
 import { createI18n } from "../../iveg/static/js/core/i18n.js";
-import {
-  isBlind,
-  sentenceOf,
-  situationOf,
-} from "../../iveg/static/js/core/situation.js";
+import { situationOf } from "../../iveg/static/js/core/situation.js";
 import { createCardOrder, sorted } from "../../iveg/static/js/panels/card_order.js";
-import { peopleSaid } from "../../iveg/static/js/panels/map_facts.js";
 import {
   createCalm,
   LASTS_MS,
   ofConnection,
 } from "../../iveg/static/js/panels/status_line.js";
-import { person, robot, situation } from "./builders.js";
+import { robot, situation } from "./builders.js";
 import { equal, test } from "./harness.js";
 import { all } from "./surfaces.js";
 
@@ -91,46 +86,8 @@ test("card and fleet page say the same of a robot without the server", async () 
   equal(robots[0].row.includes("situation.do.red_button"), true);
 });
 
-test("a camera that is out of service or not being read is none", () => {
-  const works = { required: true, missing: false, out_by: null };
-  const blind = [
-    works,
-    { ...works, missing: true },
-    { ...works, required: false, missing: false, out_by: "Ana" },
-    { ...works, required: false, missing: true },
-  ].map((detector) => isBlind(robot({ detector: /** @type {any} */ (detector) })));
-  equal(blind, [false, true, true, false]);
-});
-
-test("a sentence has what, why and what to do", () => {
-  equal(sentenceOf(NEAR, EN), "at half speed: person in aisle 3 at 1.4 m");
-  const called = { ...NOT_SLOWING, action: /** @type {const} */ ("press_stop") };
-  equal(
-    sentenceOf(called, EN),
-    "does not slow down: person in aisle 3 at 1.4 m — press STOP",
-  );
-  const named = { ...NEAR, slots: { ...NEAR.slots, lane: "Vivero" } };
-  equal(sentenceOf(named, EN), "at half speed: person in Vivero at 1.4 m");
-});
-
 /** @param {import("./builders.js").Robot[]} fleet */
 const said = (fleet) => fleetSaid(fleet, EN, NOW_MS);
-
-test("the worst of the fleet is said, of several alike together", () => {
-  const fleet = [heard(0, CLEAR, "A"), heard(0, NEAR, "B"), heard(0, NEAR, "C")];
-  equal(said(fleet.slice(0, 2)).said, "B: at half speed: person in aisle 3 at 1.4 m");
-  equal(said(fleet), {
-    level: "caution",
-    kind: "person",
-    said: "B, C: at half speed: person in aisle 3",
-    robotId: "B",
-  });
-  const other = { ...NEAR, slots: { ...NEAR.slots, lane: "4" } };
-  const apart = [heard(0, NEAR, "B"), heard(0, other, "C"), heard(0, CLEAR, "A")];
-  equal(said(apart).said, "B, C: at half speed: person near");
-  const two = [heard(0, NOT_SLOWING, "A"), heard(0, NOT_SLOWING, "B")];
-  equal(said(two).said.endsWith("(+1 in danger)"), true);
-});
 
 test("the line follows the order, and has the colour of the gravest of the fleet", () => {
   const doubted = situation({ level: "doubt", kind: "contradiction", state: "held" });
@@ -141,28 +98,6 @@ test("the line follows the order, and has the colour of the gravest of the fleet
   const two = said([heard(0, moved, "A"), heard(0, unknown, "B")]);
   equal([two.robotId, two.level], ["B", "danger"]);
   equal(two.said.endsWith("(+1 in danger)"), true);
-});
-
-test("all clear needs every robot: one away, waiting or late is not clear", () => {
-  const clear = heard(0, CLEAR, "A");
-  const waiting = heard(0, situation({ state: "waiting" }), "B");
-  equal(said([clear]).said, "A at work, all clear");
-  equal(said([clear, heard(0, CLEAR, "B")]).said, "2 robots at work, all clear");
-  equal(said([waiting]).said, "Waiting: B");
-  equal(said([clear, waiting]).said, "1 at work, all clear. Waiting: B");
-  const replay = heard(0, situation({ state: "replay" }), "C");
-  equal(said([waiting, replay]).said, "Nothing to report: B, C");
-  const away = said([clear, heard(null, CLEAR, "B")]);
-  equal([away.level, away.said], ["away", "Nothing heard yet of B"]);
-  equal(said([heard(null, CLEAR)]).said, "No robot has spoken yet");
-  equal(said([clear, heard(1.5, CLEAR, "B")]).level, "doubt");
-  const flat = situation({
-    kind: "battery",
-    state: "battery_low",
-    slots: { level: 0.15 },
-  });
-  equal(said([clear, heard(0, flat, "B")]).said, "B: battery at 15%");
-  equal(said([]).level, "away");
 });
 
 test("cards stand worst first, and as bad in the fleet's order", () => {
@@ -254,24 +189,4 @@ test("only what lasts is read aloud, once, whatever its numbers do", () => {
   equal(aloud(near("1.3 m"), 1500), null);
   equal(aloud(near("1.2 m"), 2100), "1.2 m");
   equal(aloud(near("1.1 m"), 9000), null);
-});
-
-test("people who are not seen are not counted as seen, and without a link nobody knows", () => {
-  const receivedAtMs = performance.now();
-  const now = person({ receivedAtMs });
-  const before = person({ stage: "remembered", age_s: 4, receivedAtMs });
-  const cameras = /** @type {any} */ ({ cameras: 1, share: 0.5, receivedAtMs });
-  const blind = { ...cameras, cameras: 0 };
-  equal(peopleSaid([now, now], cameras, true, EN).startsWith("2 people · "), true);
-  equal(
-    peopleSaid([now, before], cameras, true, EN),
-    "1 person · 1 more seen lately · 50% of aisles in view",
-  );
-  equal(
-    peopleSaid([now, now], blind, true, EN),
-    "2 people seen lately · No camera coverage",
-  );
-  equal(peopleSaid([], blind, true, EN), "No camera coverage");
-  equal(peopleSaid([], cameras, true, EN), "Nobody seen · 50% of aisles in view");
-  equal(peopleSaid([now], cameras, false, EN), "No link: unknown who is there");
 });

@@ -72,29 +72,6 @@ function press(id) {
   );
 }
 
-test("a robot gets its control before that of the fleet, and once", () => {
-  const { store, frame } = panel();
-  store.apply("snapshot", snapshot());
-  frame();
-  store.apply("robots/AGI", robot());
-  frame();
-  const controls = [...document.querySelectorAll("[data-stop]")];
-  equal(
-    controls.map((one) => /** @type {HTMLElement} */ (one).dataset.stop),
-    ["AGI", "fleet"],
-  );
-  equal([stateOf("AGI"), stateOf("fleet")], ["ready", "ready"]);
-});
-
-test("a finger on a control sends its robot's STOP in the same moment", () => {
-  const { store, frame, sent } = panel();
-  store.apply("snapshot", snapshot());
-  frame();
-  press("AGI");
-  equal(sent, ["AGI"]);
-  equal(stateOf("AGI"), "asked");
-});
-
 test("a press of the fleet is answered when every robot has answered", () => {
   const { store, frame } = panel();
   const robots = ["AGI", "AGII"].map((robot_id) => robot({ robot_id }));

@@ -1,13 +1,12 @@
 import { linkOf } from "../../iveg/static/js/core/clock.js";
 import { LIMITS } from "../../iveg/static/js/core/limits.js";
-import { transportsSaid } from "../../iveg/static/js/panels/stop_loud.js";
 import {
   doubtOf,
   viewOfFleet,
   viewOfRobot,
 } from "../../iveg/static/js/panels/stop_view.js";
 import { command } from "./builders.js";
-import { equal, near, test } from "./harness.js";
+import { equal, test } from "./harness.js";
 
 /** @typedef {import("../../iveg/static/js/panels/stop_view.js").RobotFacts} RobotFacts */
 /** @typedef {import("../../iveg/static/js/panels/press.js").Pending} Pending */
@@ -42,14 +41,6 @@ const stateOf = (changes) => viewOfRobot(facts(changes)).state;
 /** @param {string} state */
 const inState = (state) =>
   stateOf({ command: command({ kind: "stop", state, robot: RESTS }) });
-
-test("a fresh robot that nobody stopped can be stopped", () => {
-  equal(viewOfRobot(facts()), {
-    state: "ready",
-    key: "stop.ready",
-    slots: { robot: "AGI" },
-  });
-});
 
 test("I12 a late robot's control says how late", () => {
   const view = viewOfRobot(facts({ link: "LATE", ageS: 2.2 }));
@@ -132,34 +123,6 @@ test("a robot that moved while held is told apart from one that was asked to sto
   equal(stateOf({ command: standing }), "standing");
 });
 
-test("a standstill says how long ago it began, when that is known", () => {
-  const stands = {
-    kind: /** @type {const} */ ("stop"),
-    state: "STANDING",
-    robot: RESTS,
-  };
-  const { times } = command();
-  const standing = new Date(1000 * (facts().serverNowS - 29.7)).toISOString();
-  const timed = command({ ...stands, times: { ...times, standing } });
-  const adopted = command({ ...stands, times: { ...times, standing: null } });
-  near(Number(viewOfRobot(facts({ command: timed })).slots.seconds), 29.7, 0.001);
-  equal(viewOfRobot(facts({ command: adopted })).key, "stop.standing_untimed");
-});
-
-test("the milliseconds of a press count from the finger", () => {
-  equal(viewOfRobot(facts({ press: pressed() })), {
-    state: "asked",
-    key: "stop.asked",
-    slots: { ms: 180 },
-  });
-});
-
-test("a press that the server did not take in half a second says so", () => {
-  const late = pressed({ atMs: 9_000, tries: 2 });
-  equal(viewOfRobot(facts({ press: late })).key, "stop.not_taken");
-  equal(stateOf({ press: pressed({ atMs: 9_000, accepted: true }) }), "asked");
-});
-
 test("13.12 a press on a dead line is kept, says since when, and looks like no STOP", () => {
   for (const [atMs, seconds] of [
     [9_900, 0.1],
@@ -177,26 +140,9 @@ test("13.12 a press on a dead line is kept, says since when, and looks like no S
   equal(viewOfRobot(facts({ connection: "lost" })).key, "stop.lost");
 });
 
-test("13.8 a resume is told as a resume, and no release", () => {
-  const releasing = command({ kind: "stop", state: "RELEASING", robot: RESTS });
-  equal(viewOfRobot(facts({ command: releasing })).key, "stop.releasing");
-  const resuming = viewOfRobot(facts({ command: releasing, isResuming: true }));
-  equal([resuming.state, resuming.key], ["releasing", "stop.resuming"]);
-});
-
 test("a new press never hides that the last STOP is unconfirmed", () => {
   const open = command({ kind: "stop", state: "UNCONFIRMED" });
   equal(stateOf({ command: open, press: pressed() }), "unconfirmed");
-});
-
-test("what a robot did last seconds ago counts on while nothing is heard", () => {
-  const stale = command({
-    kind: "stop",
-    state: "STALE",
-    robot: { v: 0, report_age_s: 2, moved_m: 0 },
-  });
-  stale.receivedAtMs = 0;
-  equal(viewOfRobot(facts({ command: stale })).slots, { seconds: 12 });
 });
 
 /** @param {...Partial<RobotFacts>} robots */
@@ -218,10 +164,6 @@ test("the fleet stands only when every robot stands", () => {
   equal(fleetOf(standing, standing).key, "stop.standing_fleet");
   equal(fleetOf(standing, {}).state, "ready");
   equal(fleetOf(standing, unconfirmed).state, "unconfirmed");
-});
-
-test("the fleet can be stopped while one robot still runs", () => {
-  equal(fleetOf(unconfirmed, {}).state, "ready");
 });
 
 test("the fleet's control is dead only when nobody can be reached", () => {
@@ -301,15 +243,4 @@ test("I12 a standstill that nobody repeats becomes one of the past by itself", (
     key: "stop.stale",
     slots: { seconds: 3.1 },
   });
-});
-
-test("every transport of an order is told, also one that this page never heard of", () => {
-  const words = { t: (/** @type {string} */ key) => key.replace("stop.", "") };
-
-  const said = transportsSaid({ direct: "ok", fiware: "off", dds: "failed" }, words);
-
-  equal(
-    said,
-    "transport_direct transport.ok, FIWARE transport.off, DDS transport.failed",
-  );
 });

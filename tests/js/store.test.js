@@ -99,35 +99,6 @@ test("of people is told who has changed; the others grow older", () => {
   near(ageOf(store.people()[1], 3000), 1.1);
 });
 
-test("telemetry is told as often as it can be read, other state in the next frame", async () => {
-  const store = new Store();
-  /** @type {string[]} */
-  const told = [];
-  for (const topic of ["robots/AGI", "alerts"]) {
-    store.subscribe(topic, (_, name) => void told.push(name));
-  }
-  const until = performance.now() + 350;
-  while (performance.now() < until) {
-    store.apply("robots/AGI", robot());
-    store.apply("alerts", []);
-    await new Promise((done) => requestAnimationFrame(done));
-  }
-  const readings = told.filter((topic) => topic === "robots/AGI").length;
-  equal([readings >= 1, readings <= 4], [true, true]);
-  equal(told.length - readings > readings, true);
-});
-
-test("log entries and command events are told one by one, at once", () => {
-  const { store, heard, hear } = storeByHand();
-  hear("log");
-  hear("commands/");
-  store.apply("log", entry(1));
-  store.apply("log", entry(2));
-  store.apply("commands/c1", command());
-  store.apply("commands/c1", command({ state: "STANDING" }));
-  equal(heard, ["log", "log", "commands/c1", "commands/c1"]);
-});
-
 test("a command that follows a snapshot is told after it, and after the snapshot's own", () => {
   const { store } = storeByHand();
   /** @type {string[]} */

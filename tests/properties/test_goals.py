@@ -61,11 +61,11 @@ class Robot:
                 address=BrokerAddress("127.0.0.1", 1),
                 apikey="iveg",
                 directory=self.folder,
+                read_clock=lambda: Instant(self.now, self.now),
             ),
             profile=RobotProfile(),
             drive=lambda twist: self.driven.append((round(self.now, 3), twist)),
             navigate=self._navigate,
-            read_clock=lambda: Instant(self.now, self.now),
         )
 
     def _navigate(self, goal: Goal | None) -> bool:

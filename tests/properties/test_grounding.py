@@ -8,22 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from iveg.domain.geometry import Pose2D
 from iveg.robot.grounding import (
     DepthPicture,
     Grounded,
     Grounding,
     Mask,
-    Mount,
     Pinhole,
     Segment,
     cloud_index,
     eroded,
     ground,
     kernel_area,
-    read_mask,
-    to_detection,
-    write_mask,
 )
 
 LENS = Pinhole(48, 32, 40.0, 23.5, 15.5)
@@ -31,8 +26,6 @@ seeds = st.integers(0, 2**32 - 1)
 shares = st.sampled_from((0.0, 0.1, 0.5, 0.9, 1.0))
 edges = st.integers(1, 20)
 crosses = st.integers(1, 8)
-turns = st.floats(-math.pi, math.pi)
-metres = st.floats(-100.0, 100.0)
 
 
 @st.composite
@@ -62,23 +55,8 @@ def segment(mask: Mask, left: int, top: int) -> Segment:
         0.9,
         left + width / 2,
         top + height / 2,
-        width,
-        height,
-        write_mask(mask),
+        mask,
     )
-
-
-@given(masks())
-def test_bits_stand_where_numpy_packs_them_and_can_be_read_again(mask: Mask) -> None:
-    height, width = mask.shape
-    bits = np.packbits(mask).tobytes()
-
-    one_by_one = [
-        bits[index // 8] >> (7 - index % 8) & 1 for index in range(width * height)
-    ]
-
-    np.testing.assert_array_equal(mask.reshape(-1), one_by_one)
-    np.testing.assert_array_equal(mask, read_mask(bits, width, height))
 
 
 @given(masks(), crosses, st.integers(0, 5), st.integers(0, 5))
@@ -190,18 +168,3 @@ def test_a_target_moved_across_the_picture_moves_by_that_many_pixels_in_metres(
         for side in (0, 1)
     )
     np.testing.assert_allclose(high, low, atol=1e-9)
-
-
-@given(st.builds(Pose2D, metres, metres, turns), turns)
-def test_the_maps_centre_is_the_robots_centre_seen_from_the_map(
-    robot: Pose2D, yaw: float
-) -> None:
-    flat = DepthPicture(LENS, np.full((LENS.height, LENS.width), 2.0, np.float32))
-    found = ground(segment(np.ones((8, 7), np.bool_), 3, 4), flat)
-    mount = Mount(Pose2D(0.4, 0.1, yaw), 0.6)
-
-    assert isinstance(found, Grounded)
-    x, y, z = to_detection(found, mount).box.centre
-    there = to_detection(found, mount, robot).box.centre
-
-    np.testing.assert_allclose(there, (*robot.transform(x, y), z), atol=1e-9)

@@ -10,7 +10,7 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.parameters import ByClass
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule import judge
-from iveg.domain.rule.zones import LimitChange, Zone
+from iveg.domain.rule.zones import Distance, Distances, LimitChange, Zone
 from tests.unit.domain.scene import Scene, person
 
 FLEET = tuple(f"R{number}" for number in range(6))
@@ -71,29 +71,29 @@ def play(steps: Steps, metre: float = 2.0) -> list[object]:
 
 
 def one_by_one(
-    robots: Sequence[RobotState],
+    robots: Iterable[RobotState],
     zones: Sequence[Zone],
     entries: Mapping[str, Container[str]],
-) -> Iterator[tuple[RobotState, list[Zone]]]:
+) -> Iterator[tuple[RobotState, Distances]]:
     """Every robot with the zones that it is in or was in, each looked at alone."""
     for robot in robots:
         if robot.odometry is not None:
             pose, mine = robot.odometry.pose, entries.get(robot.robot_id, ())
-            yield (
-                robot,
-                [
-                    zone
-                    for zone in zones
-                    if zone.cause in mine
-                    or pose.distance_to(zone.x, zone.y) <= zone.radius_m + 0.01
-                ],
-            )
+            near: Distances = {}
+            for zone in zones:
+                centre_m = pose.distance_to(zone.x, zone.y)
+                one = Distance(centre_m - zone.radius_m, centre_m, zone)
+                is_near = zone.cause in mine or one.outside_m <= 0.01
+                if is_near and zone.cause != robot.robot_id:
+                    known = near.get(zone.cause, one)
+                    near[zone.cause] = min(known, one, key=lambda one: one.outside_m)
+            yield robot, near
 
 
 def assert_alike(steps: Steps, metre: float) -> None:
     """The rule finds the same whether it looks at all or only at what is near."""
     with pytest.MonkeyPatch.context() as compared:
-        compared.setattr(judge, "near_zones", one_by_one)
+        compared.setattr(judge, "distances_to_zones", one_by_one)
         expected = play(steps, metre)
     assert play(steps, metre) == expected
 

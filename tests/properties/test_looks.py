@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.tracking.calibration import (
+from iveg.domain.tracking.looks import (
     ANY,
     FARTHEST,
     Calibration,

@@ -52,7 +52,7 @@ def test_every_robots_newest_look_keeps_its_ring(
         if radius >= 2.0
     ]
     for observer, (when, (x, y)) in newest.items():
-        if scene.now - when <= LIMITS.ring_lasts_s:
+        if scene.now - when <= LIMITS.zone_lasts_s:
             assert (observer, round(x, 6), round(y, 6)) in rings
 
 

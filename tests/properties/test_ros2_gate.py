@@ -17,7 +17,7 @@ from iveg.domain.geometry import REST, Twist2D
 from iveg.lab.emulator.ros2_base import TIMEOUT_S, DriveWatchdog
 from iveg.robot.gate import RAMP_M_S2, RAMP_RAD_S2, Cap
 from iveg.robot.orders import Drive as Told
-from iveg.robot.ros2.config import DriveConfig
+from iveg.robot.ros2.config import DriveConfig, RobotConfig
 from iveg.robot.ros2.outputs import DriveTopics
 from iveg.robot.ros2.reading import InputFaults, read_twist
 from iveg.ros2 import cdr
@@ -63,12 +63,8 @@ class Gate:
     stops: int = 0
 
     def __post_init__(self) -> None:
-        self.topics = DriveTopics(
-            DriveConfig(stamped_in=True, stamped_out=True),
-            "/in",
-            "base_link",
-            InputFaults(),
-        )
+        drive = DriveConfig(stamped_in=True, stamped_out=True)
+        self.topics = DriveTopics(RobotConfig(drive=drive), InputFaults())
         self.seen = 0
 
     def happen(self, kind: str, *rest: object) -> None:

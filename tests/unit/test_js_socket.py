@@ -25,7 +25,6 @@ from websockets.typing import Subprotocol
 
 from iveg.web.live.feed import SUBPROTOCOL
 from tests.browsers import running_browser
-from tests.processes import until
 from tests.unit.test_js_modules import Files
 
 _ROOT = Path(__file__).parents[2]
@@ -192,20 +191,6 @@ def _wait_for_state(page: Page, state: str, within_ms: float = _PATIENCE_MS) -> 
     )
 
 
-def test_a_killed_server_is_noticed_and_found_again_with_a_fresh_snapshot(
-    page: Page, live: LiveServer
-) -> None:
-    page.evaluate("() => { window.first = window.store.get('snapshot'); }")
-
-    live.stop()
-    _wait_for_state(page, "lost")
-    page.clock.run_for(4000)  # long enough for the slowest pace of retries
-    live.start()
-
-    _wait_for_state(page, "open")
-    assert page.evaluate("() => window.store.get('snapshot') !== window.first")
-
-
 def test_a_line_that_falls_silent_is_lost_within_three_seconds(
     page: Page, live: LiveServer
 ) -> None:
@@ -255,16 +240,6 @@ def test_an_ended_session_is_told_and_not_tried_again(
     assert live.attempts == attempts
 
 
-def test_a_stop_goes_out_at_once_and_only_once(page: Page, live: LiveServer) -> None:
-    sent = page.evaluate("() => window.line.sendStop('AGI', 'press-1', 12.5)")
-
-    page.wait_for_function("() => window.line.pressesWaiting() === 0")
-    assert sent is True
-    assert live.heard == [
-        {"type": "stop", "robot_id": "AGI", "press_id": "press-1", "pressed_at": 12.5}
-    ]
-
-
 def test_a_stop_without_a_line_goes_out_when_the_line_is_back(
     page: Page, live: LiveServer
 ) -> None:
@@ -296,33 +271,7 @@ def test_a_stop_that_a_dead_line_swallowed_is_sent_again(
     assert len(live.heard) >= 2
 
 
-def test_the_servers_clock_is_known_to_a_few_milliseconds(
-    page: Page, live: LiveServer
-) -> None:
-    live.clock_ahead_s = 3600.0
-    live.stop()
-    _wait_for_state(page, "lost")
-    live.start()
-    _wait_for_state(page, "open")
-    page.wait_for_function(f"() => window.line.serverNow() > {time() + 3000}")
-
-    before = time()
-    told = page.evaluate("() => window.line.serverNow()")
-    after = time()
-
-    assert before - 0.1 <= told - 3600 <= after + 0.1
-
-
 # --- telemetry ----------------------------------------------------------------------
-
-
-def test_a_frame_that_was_painted_is_said_to_be(page: Page, live: LiveServer) -> None:
-    live.tell(monotonic())
-    page.wait_for_function("() => window.store.robots().get('AGI').pose?.x === 1")
-
-    until(lambda: live.heard != [], "the page says what it has painted")
-    (said,) = live.heard
-    assert (said["type"], said["frame"]) == ("painted", 1)
 
 
 def test_what_was_long_on_its_way_is_late_although_the_server_says_it_is_fresh(

@@ -212,33 +212,6 @@ def test_the_status_line_alone_names_robot_danger_and_action(
     ) == (name == "does not slow")
 
 
-TOGETHER = {
-    "lost while moving": (
-        "Los 10 robots: hasta 4 s sin contacto, en marcha — use las setas rojas",
-        "All 10 robots: no contact for up to 4 s while moving — use their red buttons",
-    ),
-    "half speed": (
-        "Los 10 robots: a media velocidad: persona en el pasillo 3",
-        "All 10 robots: at half speed: person in aisle 3",
-    ),
-    "late": (
-        "Los 10 robots: noticias de hace hasta 1,8\xa0s — trátelos como en marcha",
-        "All 10 robots: last news up to 1.8\xa0s ago — treat them as moving",
-    ),
-    "contradicts itself": (
-        "Los 10 robots: sus datos se contradicen — revíselos",
-        "All 10 robots: their data contradict themselves — check them",
-    ),
-    "red button": (
-        "Los 10 robots: bloqueados: seta roja del robot — desbloquéelos en cada robot",
-        "All 10 robots: locked: red button on the robot — unlock each at the robot",
-    ),
-    "stopped from a page": (
-        "Los 10 robots: bloqueados por la parada, quietos — rearme con la vía libre",
-        "All 10 robots: locked by STOP, standing still — release them once it is clear",
-    ),
-}
-"""What is said of ten robots in the same situation."""
 ALONE = {"does not slow"}
 """Situations of which each is told by itself: where somebody is comes first."""
 
@@ -262,8 +235,6 @@ def test_one_sentence_tells_all_robots_that_stand_alike(
             assert said.startswith(named)
         else:
             assert re.match(rf"(All |Los )?{count} robots( \(AGI, AGII…\))?: ", said)
-    if name in TOGETHER:
-        assert said == TOGETHER[name][language == "en"]
 
 
 def test_of_several_alike_most_are_told_and_in_danger_the_first(page: Page) -> None:

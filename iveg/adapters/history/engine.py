@@ -1,9 +1,8 @@
-"""Connections to the history database, the same behaviour on both kinds.
+"""Connections to the history database, and its migrations; the same on both kinds.
 
-SQLite runs in WAL so that readers never wait for the writer; its driver's own hidden
-transactions are turned off, so that a transaction begins where we say so.
-
-Bringing a database to the shape that this version of iVeg writes.
+SQLite keeps a rollback journal: WAL maps a file into memory, and whoever cuts that file
+ends every process that has it mapped.  Readers wait for the commit of a batch instead.
+The driver's own hidden transactions are off, so that one begins where we say so.
 
 The migrations lie beside the package in a checkout and inside it when installed.  Each
 start calls ``upgrade``: nothing to do costs a few milliseconds.
@@ -32,6 +31,7 @@ from iveg.adapters.files import make_private
 from iveg.domain.errors import DataFileError, HopError, MissingExtraError, SettingsError
 
 _BUSY_TIMEOUT_S = 5.0
+_BESIDE = "-journal", "-wal", "-shm"
 _POSTGRESQL = {
     "connect_timeout": 5,
     "keepalives_idle": 5,
@@ -78,8 +78,10 @@ def writing_engine(database_url: str) -> Engine:
     ``BEGIN IMMEDIATE`` waits its turn at the start; a transaction that finds out
     half-way that it must write cannot wait at all.
     """
-    # The connection stays open: whenever the last one closes, SQLite tidies up.
-    return _engine(database_url, "BEGIN IMMEDIATE", "-c lock_timeout=5s", QueuePool)
+    engine = _engine(database_url, "BEGIN IMMEDIATE", "-c lock_timeout=5s", QueuePool)
+    if engine.dialect.name == "sqlite":
+        event.listen(engine, "connect", _leave_wal)
+    return engine
 
 
 def reading_engine(database_url: str) -> Engine:
@@ -120,12 +122,12 @@ def _with_timeout(url: URL) -> URL:
 
 def _prepare_sqlite(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:
     connection.isolation_level = None
-    for pragma in (
-        "journal_mode=WAL",
-        "synchronous=NORMAL",
-        "foreign_keys=ON",
-    ):
-        connection.cursor().execute(f"PRAGMA {pragma}")
+    connection.cursor().execute("PRAGMA foreign_keys=ON")
+
+
+def _leave_wal(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:
+    """Turn a file that an earlier version wrote in WAL into one without."""
+    connection.cursor().execute("PRAGMA journal_mode=DELETE")
 
 
 def _parse(database_url: str) -> URL:
@@ -235,9 +237,9 @@ def _prepare_file(file: Path) -> None:
         damage = damage_of(file) if file.exists() else None
         if damage is not None:
             _move_aside(file, damage)
-        # SQLite gives its write-ahead files the rights of the database.
+        # SQLite gives the files beside it the rights of the database.
         make_private(file)
-        for suffix in ("-wal", "-shm"):
+        for suffix in _BESIDE:
             beside = file.with_name(file.name + suffix)
             if beside.exists():
                 make_private(beside)
@@ -269,8 +271,8 @@ def damage_of(file: Path) -> str | None:
 def _move_aside(file: Path, damage: str) -> None:
     moment = datetime.fromtimestamp(clock.wall(), UTC)
     mark = f".corrupt-{moment:%Y%m%dT%H%M%S%f}"
-    # The write-ahead files go along: left behind, they would play into the new one.
-    for part in ("", "-wal", "-shm"):
+    # What lies beside it goes along: left behind, it would play into the new one.
+    for part in ("", *_BESIDE):
         old = file.with_name(file.name + part)
         if old.exists():
             old.rename(file.with_name(file.name + mark + part))

@@ -41,9 +41,6 @@ from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.observations import Instant
 from iveg.domain.records import (
     COLUMNS,
-    AuditRecord,
-    CommandEventRecord,
-    CommandRecord,
     Record,
     is_order,
 )
@@ -52,7 +49,6 @@ from iveg.vital.record import CAPACITY, RecordQueue, Waiting
 _log = logging.getLogger(__name__)
 _Row = dict[str, object]
 _T = TypeVar("_T")
-_DURABLE = CommandRecord | CommandEventRecord | AuditRecord
 _VALUE_ERRORS = (ValueError, TypeError, OverflowError)
 
 
@@ -72,7 +68,7 @@ class Store:
             HopError: the database is away, locked, full or damaged.
             DataFileError: it cannot be brought to the shape that is written here.
         """
-        self._in_transaction(rows, lambda connection: self._insert(connection, rows))
+        self.run(lambda connection: self._insert(connection, rows))
 
     def run(self, work: Callable[[Connection], _T]) -> _T:
         """Other work of the one writer, in a transaction of its own.
@@ -81,17 +77,10 @@ class Store:
             HopError: the database is away, locked, full or damaged.
             DataFileError: it cannot be brought to the shape that is written here.
         """
-        return self._in_transaction((), work)
-
-    def _in_transaction(
-        self, rows: Sequence[Waiting], work: Callable[[Connection], _T]
-    ) -> _T:
         engine = self._ready()
         try:
-            with engine.connect() as connection:
-                _choose_durability(connection, rows)
-                with connection.begin():
-                    return work(connection)
+            with engine.begin() as connection:
+                return work(connection)
         except DBAPIError as error:
             self._let_go(error)
             raise HopError("database", reason_of(error)) from error
@@ -128,18 +117,6 @@ class Store:
         # These pass by themselves; checking the whole file again would only add to it.
         if not any(word in str(error) for word in ("is locked", "is full")):
             self.close()
-
-
-def _choose_durability(connection: Connection, rows: Sequence[Waiting]) -> None:
-    """SQLite waits for the disk where the batch holds commands or their audit trail.
-
-    Past the pool's back, because SQLAlchemy would begin a transaction for it, and
-    inside one SQLite ignores the change.
-    """
-    if connection.dialect.name != "sqlite":
-        return
-    level = "FULL" if any(isinstance(r.record, _DURABLE) for r in rows) else "NORMAL"
-    connection.connection.cursor().execute(f"PRAGMA synchronous={level}")
 
 
 def _insert(

@@ -6,12 +6,10 @@ the detectors of everybody in reach, and on nobody in reach being in doubt
 else; an empty list is the only way to 1.0.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Literal
 
-from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
@@ -43,104 +41,47 @@ def unmet_conditions(
 ) -> Mapping[str, tuple[ClearCondition, ...]]:
     """Unmet conditions of each robot, the reason for its limit first."""
     robots = world.robots.values()
-    if all(_is_plainly_whole(one, now) for one in robots):
-        return dict.fromkeys(world.robots, ())
     unmet = [
-        _Unmet.at(observer, reason)
+        (observer, ClearCondition(reason, observer.robot_id))
         for observer in robots
         for reason in _reasons(observer, now)
     ]
-    return {
-        name: ()
-        if not unmet and _is_pose_young(robot, now)
-        else tuple(_unmet_by(robot, unmet, now))
-        for name, robot in world.robots.items()
-    }
-
-
-def _is_pose_young(robot: RobotState, now: Instant) -> bool:
-    age = robot.age_s(now)
-    return age is not None and age <= LIMITS.silence_s
-
-
-@dataclass(frozen=True, slots=True)
-class _Unmet:
-    """A condition that one robot leaves unmet, and whom that concerns.
-
-    Attributes:
-        theirs: Where the observer may be; its camera protects so far (``reach_m``).
-    """
-
-    observer: RobotState
-    condition: ClearCondition
-    recording: str | None
-    theirs: tuple[Pose2D, ...]
-    reach_m: float
-
-    @classmethod
-    def at(cls, observer: RobotState, reason: Reason) -> "_Unmet":
-        """What is the same for everybody whom it may concern."""
-        return cls(
-            observer,
-            _condition(reason, observer.robot_id),
-            observer.recording,
-            observer.possible_poses(),
-            observer.profile.camera_range + LIMITS.ring_most_m,
-        )
-
-    def concerns(
-        self, robot: RobotState, recording: str | None, ours: tuple[Pose2D, ...]
-    ) -> bool:
-        """Whether a robot is where the observer's camera would protect it.
-
-        ``ours``: where that may be.
-
-        A robot of unknown place may be anywhere.  What a recording lacks concerns
-        recordings of its own frame.
-        """
-        if self.observer is robot:
-            return True
-        if self.recording != recording:
-            return False
-        if not self.theirs or not ours:
-            return True
-        for one in self.theirs:
-            for two in ours:
-                if one.distance_to(two.x, two.y) <= self.reach_m:
-                    return True
-        return False
+    return {robot.robot_id: tuple(_unmet_by(robot, unmet, now)) for robot in robots}
 
 
 def _unmet_by(
-    robot: RobotState, unmet: list[_Unmet], now: Instant
+    robot: RobotState,
+    unmet: Sequence[tuple[RobotState, ClearCondition]],
+    now: Instant,
 ) -> Iterator[ClearCondition]:
-    if not _is_pose_young(robot, now):
-        yield _condition("pose", robot.robot_id)
-    ours, recording = robot.possible_poses(), robot.recording
-    for one in unmet:
-        if one.concerns(robot, recording, ours):
-            yield one.condition
+    """Its own pose is young, and nobody in its reach leaves a condition unmet."""
+    age = robot.age_s(now)
+    if age is None or age > LIMITS.silence_s:
+        yield ClearCondition("pose", robot.robot_id)
+    for observer, condition in unmet:
+        if _is_in_reach(robot, observer):
+            yield condition
 
 
-@lru_cache(maxsize=1024)
-def _condition(reason: Reason, robot_id: str) -> ClearCondition:
-    """One value for each: of a fleet that is blind hundreds are compared."""
-    return ClearCondition(reason, robot_id)
+def _is_in_reach(robot: RobotState, observer: RobotState) -> bool:
+    """Whether a robot may be where the observer's camera would protect it.
 
-
-def _is_plainly_whole(robot: RobotState, now: Instant) -> bool:
-    """Whether a robot plainly leaves no condition unmet.
-
-    It was never doubted, and its pose and its newest frame are young, and that whole.
+    A robot of unknown place may be anywhere.  What a recording lacks concerns
+    recordings of its own frame.
     """
-    detector, pose_at = robot.detector, robot.pose_at
-    whole_at = detector.whole_at
-    if whole_at is None or pose_at is None:
+    if observer is robot:
+        return True
+    if observer.recording != robot.recording:
         return False
-    if detector.flawed_at or robot.doubts.were_raised:
-        return False
-    # Asked of all at each judgement.
-    return now.mono - min(whole_at, pose_at) <= LIMITS.silence_s
+    theirs, ours = observer.possible_poses(), robot.possible_poses()
+    reach_m = observer.profile.camera_range + LIMITS.zone_most_m
+    return (
+        not theirs
+        or not ours
+        or any(
+            one.distance_to(two.x, two.y) <= reach_m for one in theirs for two in ours
+        )
+    )
 
 
 def _reasons(observer: RobotState, now: Instant) -> Iterator[Reason]:

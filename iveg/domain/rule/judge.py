@@ -1,13 +1,14 @@
-"""Speed limits of the fleet at one moment, with their causes.
+"""Speed limits of the fleet at one moment, with their causes: the rule itself.
 
-A robot inside the zone of a person or of a moving peer is limited to half speed;
-it is let go 0.3 m outside the zone and 1.0 s later, so that noise does not flap
+Algorithms 2 and 3 of the paper; comments quote their lines.  A robot inside the zone of
+a person or of a moving peer, or about to reach it, is limited to half speed.  It is let
+go 0.3 m outside the zone and 1.0 s later, so that noise does not flap
 (docs/safety.md, "The rule").  The least factor counts, never the product.  Outside all
 zones a robot is clear only while every condition of that claim holds (``clear``).
 """
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from copy import copy
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import count
 
 from iveg.domain.detection_rule import DetectionRule
@@ -16,24 +17,16 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.clear import ClearCondition, unmet_conditions
-from iveg.domain.rule.foresight import (
-    Encounter,
-    Encounters,
-    Foresight,
-    by_cause,
-    gives_way_to,
-)
-from iveg.domain.rule.paths import HOLDS_S, slows_within_s
+from iveg.domain.rule.foresight import Encounters, gives_way_to, look_ahead
+from iveg.domain.rule.paths import EVERY_S, slows_within_s
 from iveg.domain.rule.zones import (
+    Distance,
     Distances,
     LimitChange,
     Zone,
     ZoneEntry,
-    distances,
-    has_told,
-    is_slow_already,
-    leave,
-    near_zones,
+    distances_to_zones,
+    enter,
     zones_of,
 )
 from iveg.domain.tracking.people import People
@@ -48,26 +41,26 @@ class SpeedLimits:
     Attributes:
         unmet: Conditions of "clear" that do not hold for each robot, since the last
             judgement.
-        encounters: Encounters ahead, since the last judgement.
+        encounters: Encounters ahead, of the last fifth of a second.
     """
 
     def __init__(self, greenhouse: Greenhouse) -> None:
         self._greenhouse = greenhouse
         self._open: dict[str, dict[str, ZoneEntry]] = {}
-        """By robot and cause."""
+        """Entries by robot and cause."""
         self.unmet: Mapping[str, tuple[ClearCondition, ...]] = {}
-        self._foresight = Foresight()
-        self._fastest: dict[str, float] = {}
-        """Of slow robots, before and since (m/s)."""
         self.encounters: Encounters = {}
+        self._looked_at = -math.inf
+        self._fastest: dict[str, float] = {}
+        """Speed of slow robots, before and since (m/s)."""
         self._limits: dict[str, SpeedLimit] = {}
-        """Of the last judgement."""
+        """Limits of the last judgement."""
 
     def copy(self) -> "SpeedLimits":
         """Another with the same entries and encounters."""
         other = SpeedLimits(self._greenhouse)
         other._open = {name: {**mine} for name, mine in self._open.items()}
-        other._foresight = copy(self._foresight)
+        other.encounters, other._looked_at = self.encounters, self._looked_at
         other._fastest = {**self._fastest}
         return other
 
@@ -75,11 +68,6 @@ class SpeedLimits:
     def entries(self) -> Iterable[ZoneEntry]:
         """Every entry that has begun and not ended."""
         return [one for mine in self._open.values() for one in mine.values()]
-
-    def encounters_told(self, robot_id: str) -> Mapping[str, Encounter]:
-        """Encounters ahead of a robot by cause, for people to see."""
-        ahead = self.encounters.get(robot_id, ())
-        return {**by_cause(ahead, "tells"), **by_cause(ahead, "slows")}
 
     def evaluate(
         self,
@@ -90,20 +78,24 @@ class SpeedLimits:
         new_id: str,
     ) -> tuple[dict[str, SpeedLimit], list[LimitChange]]:
         """Judge the whole fleet; ``new_id`` begins the ids of new decisions."""
-        # Algorithm 3: a circle round each alert and each peer.
+        # Algorithm 3, line 9: "set farmer/robot pos. in local map and generate security
+        # circle", of each alert (Algorithm 2, lines 4-6) and of each peer.
         zones = list(zones_of(world, people, rule, now))
+        # "If the trajectory intersects with the 2-meter safety zone of a farmer or the
+        # safety buffer of a peer, the recipient robot initiates a preemptive velocity
+        # reduction."
+        self._look_ahead(world, zones, rule, now)
+        # Algorithm 3, lines 10 and 16: "if farmer_pos =< AG/odom", "if ag_robot_pos =<
+        # AG/odom".
         ids = (f"{new_id}-{number}" for number in count())
-        self.encounters = self._look_ahead(world, people, rule, now)
         changes = list[LimitChange]()
         robots = [*world.robots.values()]
-        for robot, near in near_zones(robots, zones, self._open):
-            mine = self._open.setdefault(robot.robot_id, {})
-            near_by = distances(robot, near)
-            # Before the circle, where the robot's own path meets it.
-            near_by |= self._reached_soon(robot, mine, world, now)
-            changes += self._update(robot, mine, near_by, now, ids)
-        # Algorithm 2 ends in the feedback: half speed inside, full where all is clear.
+        for robot, near in distances_to_zones(robots, zones, self._open):
+            near |= self._soon_inside(robot, world, now)
+            changes += self._enter_and_leave(robot, near, now, ids)
+        # "Speed -> 100 % upon clearance".
         self.unmet = unmet_conditions(world, now)
+        # Algorithm 3, lines 11 and 17: "V_linear = V_input x 0.5".
         limits = {name: self._speed_limit(name) for name in self.unmet}
         # What feedback shares is written once for as long as it is the very same.
         if limits != self._limits:
@@ -111,130 +103,76 @@ class SpeedLimits:
         return self._limits, changes
 
     def _look_ahead(
-        self,
-        world: World,
-        people: People,
-        rule: DetectionRule,
-        now: Instant,
-    ) -> Encounters:
-        """Encounters with people and peers."""
+        self, world: World, zones: Iterable[Zone], rule: DetectionRule, now: Instant
+    ) -> None:
+        """Find the encounters ahead, five times a second."""
         if not rule.foresight:
-            self._foresight = Foresight()
-            return {}
-        if self._foresight.is_due(now):
+            self.encounters, self._looked_at = {}, -math.inf
+        elif not 0.0 <= now.mono - self._looked_at < EVERY_S - 1e-6:
+            self._looked_at = now.mono
             self._fastest = {
                 robot_id: max(
                     self._fastest.get(robot_id, 0.0),
-                    # Who is slow early for a task may not have been fast yet.
+                    # A robot that is slow early for a task was perhaps not fast yet.
                     world.robots[robot_id].track.motion.speed,
                     *(one.speed_before for one in mine.values()),
                 )
                 for robot_id, mine in self._open.items()
                 if mine
             }
-        return self._foresight.look(world, people, rule, now, self._fastest)
+            self.encounters = look_ahead(world, zones, rule, now, self._fastest)
 
-    def _reached_soon(
-        self,
-        robot: RobotState,
-        mine: Mapping[str, ZoneEntry],
-        world: World,
-        now: Instant,
-    ) -> Distances:
-        """Zones that a robot will reach, as if it were at their border now.
+    def _soon_inside(
+        self, robot: RobotState, world: World, now: Instant
+    ) -> dict[str, Distance]:
+        """Zones ahead that count as if the robot were at their border now.
 
-        In time to be slow there; who gives way does not wait for that.  Who is slow for
-        one already stays so while it lies ahead, or would lie ahead again at the speed
-        of before: it shall not speed up for that.
+        An encounter counts from the time on that slowing down takes, and at once where
+        the robot gives way.  A robot that is slow for one stays so while it lies ahead,
+        also if it would only at the speed of before: it shall not speed up for that.
         """
-        encounters, odometry = self.encounters.get(robot.robot_id), robot.odometry
-        if odometry is None or not encounters:
+        ahead = self.encounters.get(robot.robot_id)
+        if robot.odometry is None or not ahead:
             return {}
-        ahead = by_cause(encounters, "slows")
+        mine = self._open.get(robot.robot_id, {})
+        on_path = [one for one in ahead.values() if one.effect == "slows"]
+        near = [*(one.zone for one in on_path), *(one.zone for one in mine.values())]
+        yields_to = gives_way_to(robot, near, world, now)
         soon_s = slows_within_s(robot.profile.braking, robot.track.motion.speed)
-        yields_to = self._yields_to(robot, ahead, world, now)
-        holds = by_cause(encounters, "holds").items()
-        held = {cause: one for cause, one in holds if cause in mine}
-        near = {
-            cause: one
-            for cause, one in ahead.items()
-            if cause in yields_to
-            or one.in_s <= (max(HOLDS_S, soon_s) if cause in mine else soon_s)
-        }
-        distance_to = odometry.pose.distance_to
+        soon = {one.zone.cause for one in on_path if one.in_s <= soon_s}
+        pose = robot.odometry.pose
         return {
-            cause: (0.0, distance_to(one.zone.x, one.zone.y), one.zone)
-            for cause, one in (held | near).items()
+            cause: Distance(0.0, pose.distance_to(one.zone.x, one.zone.y), one.zone)
+            for cause, one in ahead.items()
+            if cause in mine or cause in soon or cause in yields_to
         }
 
-    def _yields_to(
-        self,
-        robot: RobotState,
-        ahead: Mapping[str, Encounter],
-        world: World,
-        now: Instant,
-    ) -> Collection[str]:
-        """Peers that a robot gives way to by their tasks: nobody if people are near."""
-        if world.robots.keys().isdisjoint(ahead):
-            return ()
-        near = self._open.get(robot.robot_id, {}).values()
-        zones = [*(one.zone for one in ahead.values()), *(one.zone for one in near)]
-        if any(zone.reason == "person" for zone in zones):
-            return ()
-        return gives_way_to(robot, ahead, world, now)
-
-    def _update(
-        self,
-        robot: RobotState,
-        mine: dict[str, ZoneEntry],
-        near_by: Distances,
-        now: Instant,
-        ids: Iterator[str],
+    def _enter_and_leave(
+        self, robot: RobotState, near: Distances, now: Instant, ids: Iterator[str]
     ) -> Iterator[LimitChange]:
         """Begin, continue and end the entries of one robot."""
-        for cause, (depth, distance, zone) in near_by.items():
-            entry = mine.get(cause)
-            if entry is not None:
-                mine[cause] = entry.continued(depth, distance, now)
-            elif depth <= 0.0:
-                entry = self._enter(robot, zone, distance, now, next(ids))
-                mine[cause] = entry
-                yield LimitChange(entry, began=True)
-        yield from leave(mine, near_by, now)
-
-    def _enter(
-        self,
-        robot: RobotState,
-        zone: Zone,
-        distance: float,
-        now: Instant,
-        decision_id: str,
-    ) -> ZoneEntry:
-        odometry = robot.odometry
-        assert odometry is not None  # noqa: S101 - nothing is near without it
-        pose, speed = odometry.pose, robot.motion(now).speed
-        return ZoneEntry(
-            decision_id,
-            robot.robot_id,
-            zone,
-            entered=now,
-            entered_m=distance,
-            speed_before=speed,
-            # Whom its own detector found it sees, whatever leaves the plan knows of.
-            in_sight=zone.observer == robot.robot_id
-            or self._greenhouse.in_sight(pose.x, pose.y, zone.x, zone.y),
-            distance_m=distance,
-            already_slow=is_slow_already(robot, zone, speed),
-            told_before=has_told(robot, zone),
-            foretold_s=self._foretold_s(robot.robot_id, zone, distance),
-        )
+        mine = self._open.setdefault(robot.robot_id, {})
+        for cause, one in near.items():
+            if cause in mine:
+                mine[cause] = mine[cause].moved(one.outside_m, one.centre_m, now)
+            elif one.outside_m <= 0.0:
+                foretold_s = self._foretold_s(robot.robot_id, one.zone, one.centre_m)
+                sight = self._greenhouse
+                mine[cause] = enter(robot, one, sight, foretold_s, now, next(ids))
+                yield LimitChange(mine[cause], began=True)
+        for cause, entry in list(mine.items()):
+            if cause not in near:
+                entry = mine[cause] = entry.moved(math.inf, entry.distance_m, now)
+            if entry.is_over(now):
+                del mine[cause]
+                yield LimitChange(entry, began=False)
 
     def _foretold_s(self, robot_id: str, zone: Zone, distance_m: float) -> float | None:
         """When a robot will reach a cause's zone (s); None: it is inside, or leaves."""
-        ahead = by_cause(self.encounters.get(robot_id, ()), "slows")
-        encounter = ahead.get(zone.cause)
-        is_inside = distance_m <= zone.radius_m
-        return None if encounter is None or is_inside else encounter.in_s
+        encounter = self.encounters.get(robot_id, {}).get(zone.cause)
+        if encounter is None or encounter.effect == "holds":
+            return None
+        return None if distance_m <= zone.radius_m else encounter.in_s
 
     def _speed_limit(self, robot_id: str) -> SpeedLimit:
         """The most specific reason wins: an unmet condition comes last."""

@@ -20,8 +20,6 @@ HORIZON_S = FORESIGHT_MOST_S
 _STEP_S = 0.1
 AHEAD_S: _Floats = np.arange(0.0, HORIZON_S + _STEP_S / 2, _STEP_S)
 """The moments of a path (s)."""
-HOLDS_S = 2.0
-"""A robot that is slow for a zone stays so while it lies so far ahead (s)."""
 EVERY_S = 0.2
 """Encounters are looked for five times a second."""
 MOVES_M_S = 0.05
@@ -29,11 +27,11 @@ MOVES_M_S = 0.05
 _REACTION_S = 0.4
 """From here to the robot's brakes (s)."""
 _COMFORT = 0.5
-"""Of what the brakes can do: nobody has to jump, and no load slides."""
+"""Share of the possible braking: nobody has to jump, and no load slides."""
 PLAN_LASTS_S = 2.5
 """An older plan is not what a robot drives."""
 _PLAN_WITHIN_M = 0.5
-"""Nor is one that is farther from the robot."""
+"""A plan that is farther from the robot is none, either."""
 _PLAN_POINTS = 200
 
 Plan = Sequence[tuple[float, float]]
@@ -43,7 +41,7 @@ Path = tuple[_Floats, _Floats]
 
 
 def slows_within_s(braking: float, speed: float) -> float:
-    """How long a robot takes to halve this speed (m/s) with comfort (s).
+    """Time that a robot takes to halve this speed (m/s) with comfort (s).
 
     Args:
         braking: What its brakes can do (m/s²).
@@ -53,7 +51,7 @@ def slows_within_s(braking: float, speed: float) -> float:
 
 
 def sped_up(twist: Twist2D, to: float) -> Twist2D:
-    """The same arc, driven at least so fast (m/s)."""
+    """The arc of a twist, driven at least so fast (m/s)."""
     faster = max(1.0, to / max(abs(twist.linear_x), MOVES_M_S))
     return Twist2D(twist.linear_x * faster, twist.angular_z * faster)
 

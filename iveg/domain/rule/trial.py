@@ -21,6 +21,7 @@ MOST_KEPT: Final = 200
 _LONGEST_S: Final = 1.0
 """A judgement after a longer silence does not stand for all of it."""
 Limits = Mapping[str, SpeedLimit]
+Kind = Literal["slows", "frees"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,36 +37,12 @@ class Difference:
     """
 
     robot_id: str
-    kind: Literal["slows", "frees"]
+    kind: Kind
     reason: str
     cause: str | None
     decision_id: str | None
     began: float
     ended: float | None = None
-
-
-@dataclass(slots=True)
-class _Sums:
-    """What one version did so far."""
-
-    slowed_s: defaultdict[str, float]
-    encounters: Counter[str]
-
-    @classmethod
-    def of(cls, done: Doings) -> "_Sums":
-        return cls(defaultdict(float, done.slowed_s), Counter(done.encounters))
-
-    def add(self, limits: Iterable[SpeedLimit], passed_s: float) -> None:
-        for limit in limits:
-            if _slows(limit):
-                self.slowed_s[limit.reason] += passed_s
-
-    def meet(self, changes: Iterable[LimitChange]) -> None:
-        self.encounters.update(one.entry.zone.reason for one in changes if one.began)
-
-    def doings(self) -> Doings:
-        seconds = {why: round(s, 3) for why, s in self.slowed_s.items()}
-        return Doings(seconds, dict(self.encounters))
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,27 +71,22 @@ class Account:
     """
 
     def __init__(self, trial: Trial) -> None:
-        self._trial = trial
-        before = trial.so_far
-        self._in_force = _Sums.of(Doings() if before is None else before.in_force)
-        self._candidate = _Sums.of(Doings() if before is None else before.candidate)
-        self._counts = Counter[str]()
-        self._since = trial.since if before is None else before.since
-        self._until = self._since if before is None else before.until
-        self._compared_s = 0.0 if before is None else before.compared_s
-        self._against = None if before is None else before.against
-        if before is not None:
-            self._counts.update(slows=before.would_slow, frees=before.would_not)
+        self._trial, self._so_far = trial, trial.so_far
+        until = trial.since if trial.so_far is None else trial.so_far.until
         # What went on when iVeg ended, ended with it.
-        self._ended: deque[Difference] = deque(
-            (_over(one, self._until) for one in trial.differences), MOST_KEPT
+        self._ended = deque(
+            (
+                one if one.ended is not None else replace(one, ended=until)
+                for one in trial.differences
+            ),
+            MOST_KEPT,
         )
         self._open: dict[str, Difference] = {}
         self._at: float | None = None
 
     def is_of(self, rule: DetectionRule) -> bool:
         """Whether it compares with this version; else it is over."""
-        return self._against in (None, rule.version)
+        return self._so_far is None or self._so_far.against == rule.version
 
     def judged(
         self,
@@ -124,61 +96,77 @@ class Account:
         now: Instant,
     ) -> None:
         """Take one judgement of both; of ``rule``, the version in force."""
-        self._against = rule.version
         passed = 0.0 if self._at is None else min(now.mono - self._at, _LONGEST_S)
-        self._at, self._until = now.mono, now.wall
-        self._compared_s += passed
-        sums = (self._in_force, in_force), (self._candidate, candidate)
-        for sum_, (limits, changes) in sums:
-            sum_.add(limits.values(), passed)
-            sum_.meet(changes)
-        for robot_id, limit in in_force[0].items():
-            if robot_id in candidate[0]:
-                self._differ(robot_id, limit, candidate[0][robot_id], now.wall)
+        self._at, since = now.mono, self._trial.since
+        before = self._so_far or Comparison(
+            since, since, rule.version, 0.0, Doings(), Doings(), 0, 0
+        )
+        begun = Counter(
+            self._differ(robot_id, limit, candidate[0][robot_id], now.wall)
+            for robot_id, limit in in_force[0].items()
+            if robot_id in candidate[0]
+        )
+        self._so_far = replace(
+            before,
+            until=now.wall,
+            against=rule.version,
+            compared_s=before.compared_s + passed,
+            in_force=_with(before.in_force, *in_force, passed),
+            candidate=_with(before.candidate, *candidate, passed),
+            would_slow=before.would_slow + begun["slows"],
+            would_not=before.would_not + begun["frees"],
+        )
 
     def _differ(
         self, robot_id: str, in_force: SpeedLimit, would: SpeedLimit, wall: float
-    ) -> None:
+    ) -> Kind | None:
+        """Note what begins and ends now; returns what began."""
         before = self._open.get(robot_id)
-        kind: Literal["slows", "frees"] | None = None
+        kind: Kind | None = None
         if _slows(in_force) != _slows(would):
             kind = "slows" if _slows(would) else "frees"
         if before is not None and before.kind != kind:
             self._ended.append(replace(before, ended=wall))
             del self._open[robot_id]
-        if kind is not None and robot_id not in self._open:
-            by = would if kind == "slows" else in_force
-            decision_id = None if kind == "slows" else in_force.decision_id
-            self._open[robot_id] = Difference(
-                robot_id, kind, by.reason, by.cause, decision_id, wall
-            )
-            self._counts[kind] += 1
+        if kind is None or robot_id in self._open:
+            return None
+        by = would if kind == "slows" else in_force
+        decision_id = None if kind == "slows" else in_force.decision_id
+        self._open[robot_id] = Difference(
+            robot_id, kind, by.reason, by.cause, decision_id, wall
+        )
+        return kind
 
     def trial(self) -> Trial:
-        """As it stands."""
+        """The trial with its account so far."""
         differences = (*self._ended, *self._open.values())
-        return replace(
-            self._trial,
-            so_far=None if self._against is None else self._comparison(self._against),
-            differences=differences[-MOST_KEPT:],
-        )
+        so_far = self._so_far
+        if so_far is not None:
+            so_far = replace(
+                so_far,
+                compared_s=round(so_far.compared_s, 3),
+                in_force=_rounded(so_far.in_force),
+                candidate=_rounded(so_far.candidate),
+            )
+        kept = differences[-MOST_KEPT:]
+        return replace(self._trial, so_far=so_far, differences=kept)
 
-    def _comparison(self, against: int) -> Comparison:
-        return Comparison(
-            self._since,
-            self._until,
-            against,
-            round(self._compared_s, 3),
-            self._in_force.doings(),
-            self._candidate.doings(),
-            self._counts["slows"],
-            self._counts["frees"],
-        )
+
+def _with(
+    done: Doings, limits: Limits, changes: Iterable[LimitChange], passed_s: float
+) -> Doings:
+    """Sums of a version after one more judgement."""
+    slowed_s = defaultdict(float, done.slowed_s)
+    for limit in filter(_slows, limits.values()):
+        slowed_s[limit.reason] += passed_s
+    met = Counter(one.entry.zone.reason for one in changes if one.began)
+    return Doings(slowed_s, Counter(done.encounters) + met)
+
+
+def _rounded(done: Doings) -> Doings:
+    seconds = {why: round(s, 3) for why, s in done.slowed_s.items()}
+    return Doings(seconds, dict(done.encounters))
 
 
 def _slows(limit: SpeedLimit) -> bool:
     return limit.speed_factor <= HALF_SPEED
-
-
-def _over(one: Difference, until: float) -> Difference:
-    return one if one.ended is not None else replace(one, ended=until)

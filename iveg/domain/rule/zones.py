@@ -1,15 +1,15 @@
 """Zones round people and peers, which slow robots, and entries of robots into them."""
 
-import math
-from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED
+from iveg.domain.geometry import Pose2D
+from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
@@ -18,7 +18,7 @@ from iveg.domain.tracking.person import Sighting, TrackedPerson
 from iveg.domain.world import World
 
 _ROUNDING_M = 0.01
-"""So far outside a zone nobody can be inside, whatever rounding does."""
+"""Rounding moves no robot that is farther outside a zone into it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,53 +97,62 @@ def _zone_of_peer(
     age = max(0.0, now.mono - since)
     known = peer.age_s(now)
     at_rest = peer.stands and known is not None and known <= LIMITS.silence_s
-    if at_rest or age > LIMITS.ring_lasts_s:
+    if at_rest or age > LIMITS.zone_lasts_s:
         return
     pose, name, radius = peer.odometry.pose, peer.robot_id, rule.radius_at(age, "robot")
     fresh_m = rule.radius_m.of("robot")
     yield Zone("robot", name, name, pose.x, pose.y, radius, fresh_m)
 
 
-Distances = dict[str, tuple[float, float, Zone]]
-"""Cause → how far outside its nearest zone (m), from its centre (m), and the zone."""
+class Distance(NamedTuple):
+    """Distance of a robot from a zone: outside its border (m), from its centre (m)."""
+
+    outside_m: float
+    centre_m: float
+    zone: Zone
 
 
-def near_zones(
-    robots: Sequence[RobotState],
+Distances = dict[str, Distance]
+"""Cause → distance to that of its zones in which the robot is deepest."""
+
+
+def distances_to_zones(
+    robots: Iterable[RobotState],
     zones: Sequence[Zone],
-    entries: Mapping[str, Iterable[str]],
-) -> Iterator[tuple[RobotState, list[Zone]]]:
-    """Each robot with the zones that it is in or was in: all against all, as arrays."""
-    x, y = np.array([one.x for one in zones]), np.array([one.y for one in zones])
-    radius = np.array([one.radius_m for one in zones])
-    of_cause = defaultdict[str, list[int]](list)
-    for number, zone in enumerate(zones):
-        of_cause[zone.cause].append(number)
+    entries: Mapping[str, Container[str]],
+) -> Iterator[tuple[RobotState, Distances]]:
+    """Each robot with the causes in whose zones it is, or has an entry.
+
+    Arrays find the few zones that are near, of all robots and zones.
+    """
+    places = [(one.x, one.y, one.radius_m) for one in zones]
+    x, y, radius = np.array(places, np.float64).reshape(-1, 3).T
     for robot in robots:
         if robot.odometry is None:
             continue
-        pose = robot.odometry.pose
+        pose, entered = robot.odometry.pose, entries.get(robot.robot_id, ())
         inside = np.hypot(x - pose.x, y - pose.y) - radius <= _ROUNDING_M
-        near = set(np.flatnonzero(inside).tolist())
-        for cause in entries.get(robot.robot_id, ()):
-            near.update(of_cause.get(cause, ()))
-        yield robot, [zones[number] for number in sorted(near)]
+        near = (
+            zone
+            for zone, is_inside in zip(zones, inside.tolist(), strict=True)
+            if is_inside or zone.cause in entered
+        )
+        yield robot, _distances(robot, pose, near)
 
 
-def distances(robot: RobotState, zones: Iterable[Zone]) -> Distances:
-    """How a robot lies to the deepest zone of each cause."""
+def _distances(robot: RobotState, pose: Pose2D, zones: Iterable[Zone]) -> Distances:
+    """A robot's own zone, and those of other maps' recordings, are none of its."""
     nearest: Distances = {}
-    if robot.odometry is None:
-        return nearest
-    pose, robot_id, recording = robot.odometry.pose, robot.robot_id, robot.recording
     for zone in zones:
-        cause = zone.cause
-        if cause == robot_id or zone.recording not in (None, recording):
+        if zone.cause == robot.robot_id:
             continue
-        distance = math.hypot(zone.x - pose.x, zone.y - pose.y)
-        depth = distance - zone.radius_m
-        if cause not in nearest or depth < nearest[cause][0]:
-            nearest[cause] = depth, distance, zone
+        if zone.recording not in (None, robot.recording):
+            continue
+        centre_m = pose.distance_to(zone.x, zone.y)
+        found = Distance(centre_m - zone.radius_m, centre_m, zone)
+        known = nearest.get(zone.cause)
+        if known is None or found.outside_m < known.outside_m:
+            nearest[zone.cause] = found
     return nearest
 
 
@@ -176,35 +185,46 @@ class ZoneEntry:
     outside_since: float | None = None
     foretold_s: float | None = None
 
-    def continued(self, depth_m: float, distance_m: float, now: Instant) -> "ZoneEntry":
-        """The same, still inside or so far outside by now (m)."""
+    def moved(self, outside_m: float, distance_m: float, now: Instant) -> "ZoneEntry":
+        """The entry with the robot so far outside the zone and from its centre (m)."""
         since = None
-        if depth_m > LIMITS.release_beyond_m:
+        if outside_m > LIMITS.release_beyond_m:
             since = self.outside_since or now.mono
-        if distance_m == self.distance_m and since == self.outside_since:
-            return self
-        return self.later(distance_m, since)
+        return replace(self, distance_m=distance_m, outside_since=since)
 
-    def later(self, distance_m: float, outside_since: float | None) -> "ZoneEntry":
-        """The same, from another place of the robot or of the zone.
+    def is_over(self, now: Instant) -> bool:
+        """Whether the robot has been outside for long enough."""
+        since = self.outside_since
+        return since is not None and now.mono - since >= LIMITS.release_after_s
 
-        Spelled out, as ``dataclasses.replace`` takes three times as long, and each
-        robot that moves is judged anew.
-        """
-        return ZoneEntry(
-            self.decision_id,
-            self.robot_id,
-            self.zone,
-            self.entered,
-            self.entered_m,
-            self.speed_before,
-            self.in_sight,
-            distance_m,
-            self.already_slow,
-            self.told_before,
-            outside_since,
-            self.foretold_s,
-        )
+
+def enter(
+    robot: RobotState,
+    near: Distance,
+    greenhouse: Greenhouse,
+    foretold_s: float | None,
+    now: Instant,
+    decision_id: str,
+) -> ZoneEntry:
+    """An entry that begins now; ``foretold_s``: in so long the robot reaches it (s)."""
+    odometry, zone = robot.odometry, near.zone
+    assert odometry is not None  # noqa: S101 - nothing is near without it
+    pose, speed = odometry.pose, robot.motion(now).speed
+    return ZoneEntry(
+        decision_id,
+        robot.robot_id,
+        zone,
+        entered=now,
+        entered_m=near.centre_m,
+        speed_before=speed,
+        # It sees what its own detector found, whatever leaves the plan knows of.
+        in_sight=zone.observer == robot.robot_id
+        or greenhouse.in_sight(pose.x, pose.y, zone.x, zone.y),
+        distance_m=near.centre_m,
+        already_slow=_is_slow_already(robot, zone, speed),
+        told_before=_has_told(robot, zone),
+        foretold_s=foretold_s,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,27 +235,7 @@ class LimitChange:
     began: bool
 
 
-def leave(
-    mine: dict[str, ZoneEntry], near: Mapping[str, object], now: Instant
-) -> Iterator[LimitChange]:
-    """End the entries of a robot that has been outside for long enough.
-
-    Args:
-        mine: Of one robot, by cause; those that end go from it.
-        near: Causes whose zones it is near.
-        now: This moment.
-    """
-    for cause, entry in list(mine.items()):
-        if cause not in near and entry.outside_since is None:
-            entry = entry.later(entry.distance_m, now.mono)
-            mine[cause] = entry
-        since = entry.outside_since
-        if since is not None and now.mono - since >= LIMITS.release_after_s:
-            del mine[cause]
-            yield LimitChange(entry, began=False)
-
-
-def is_slow_already(robot: RobotState, zone: Zone, speed: float) -> bool:
+def _is_slow_already(robot: RobotState, zone: Zone, speed: float) -> bool:
     """Whether a robot will show no slow-down, because it drives slowly already.
 
     A robot judges alerts by its own pose, too, and may report this very zone a few
@@ -245,10 +245,10 @@ def is_slow_already(robot: RobotState, zone: Zone, speed: float) -> bool:
     if robot.safety is None or robot.safety.speed_factor > HALF_SPEED:
         return False
     slow = HALF_SPEED * robot.profile.max_speed
-    return not has_told(robot, zone) or speed <= slow
+    return not _has_told(robot, zone) or speed <= slow
 
 
-def has_told(robot: RobotState, zone: Zone) -> bool:
+def _has_told(robot: RobotState, zone: Zone) -> bool:
     """Whether the robot already reports that it is slow for this very hazard."""
     report = robot.safety
     if report is None or report.speed_factor > HALF_SPEED:

@@ -1,22 +1,17 @@
 """STOP, from a person's hand to a measured standstill (docs/safety.md, "STOP")."""
 
 from iveg.domain.stop.commands import (
-    CommandState,
     FollowedCommand,
     Press,
     State,
     Times,
-    believe,
 )
-from iveg.domain.stop.machine import STEPS, Step, StopMachine
+from iveg.domain.stop.machine import STEPS, StopMachine
 from iveg.domain.stop.status import (
-    FIWARE_PAUSE_S,
-    STANDING_RESEND_S,
     Changed,
     Closed,
     DesiredRecord,
     Effect,
-    Event,
     Key,
     OffTable,
     SendOnce,
@@ -25,15 +20,11 @@ from iveg.domain.stop.status import (
 )
 
 __all__ = [
-    "FIWARE_PAUSE_S",
-    "STANDING_RESEND_S",
     "STEPS",
     "Changed",
     "Closed",
-    "CommandState",
     "DesiredRecord",
     "Effect",
-    "Event",
     "FollowedCommand",
     "Key",
     "OffTable",
@@ -42,8 +33,6 @@ __all__ = [
     "SendStop",
     "SetDesiredState",
     "State",
-    "Step",
     "StopMachine",
     "Times",
-    "believe",
 ]

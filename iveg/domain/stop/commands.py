@@ -1,12 +1,9 @@
 """State of one STOP, RELEASE or RESUME at one moment, with the time of each step.
 
 A STOP's times are the press on the browser's clock, accepted (``requested``), sent and
-answered on each transport, and standing (docs/interfaces/resources.md).
-
-Outcome of an order, for readers of the history (docs/interfaces/resources.md).
-
-A row keeps the state of the machine when the order was no longer followed, and that is
-the robot's state: "running" does not say how a STOP ended.
+answered on each transport, and standing.  ``outcome_of`` reads the rows of the history:
+a row keeps the robot's state when the order was no longer followed, and "running" does
+not say how a STOP ended.  Both are described in docs/interfaces/resources.md.
 """
 
 from collections.abc import Iterable, Mapping
@@ -84,7 +81,7 @@ class Times:
     standing: Instant | None = None
 
     @classmethod
-    def of(cls, at: Instant, press: Press) -> "Times":
+    def from_press(cls, at: Instant, press: Press) -> "Times":
         """A command accepted now; its press as the page sent it, if plausible."""
         pressed = believe(press.pressed_at, at)
         doubted = pressed is None and press.pressed_at is not None
@@ -199,6 +196,7 @@ Outcome = Literal[
     "cancelled",
     "deleted",
 ]
+_CLOSED: Mapping[str, Outcome] = {"EXPIRED": "expired", "REPLACED": "replaced"}
 _OF_GOALS: Mapping[str, Outcome] = {
     "REACHED": "reached",
     "REFUSED": "refused",
@@ -230,25 +228,19 @@ def write_command(command: FollowedCommand) -> CommandRecord:
 
 def outcome_of(record: CommandRecord) -> Outcome:
     """Outcome of an order; ``open`` while it is followed."""
-    if record.state == "EXPIRED":
-        return "expired"
-    if record.state == "REPLACED":
-        return "replaced"
-    if record.kind == "stop":
-        return _of_stop(record)
+    if record.state in _CLOSED:
+        return _CLOSED[record.state]
     if record.kind == "goal":
         return _OF_GOALS.get(record.state, "open")
+    if record.kind == "stop":
+        if record.state not in ("RUNNING", "READY"):
+            return "open"
+        return "not_seen_standing" if record.standing_at is None else "stood"
     if record.state == "RELEASING":
         return "open"
     if record.reason is not None:
         return "refused"
     return "released" if record.kind == "release" else "resumed"
-
-
-def _of_stop(record: CommandRecord) -> Outcome:
-    if record.state not in ("RUNNING", "READY"):
-        return "open"
-    return "not_seen_standing" if record.standing_at is None else "stood"
 
 
 def was_loud(states: Iterable[str]) -> bool:

@@ -1,23 +1,30 @@
-"""Measured standstill: shown by safety reports and not contradicted by odometry.
+"""Standing still, as it is measured; and what a robot's newest report allows.
 
-Five samples at rest over at least a second, none more than half a second after the one
-before (0.75 s on a topic that has two a second).  Both are measured on the robot's own
-monotonic clock where it sends it, so that neither a burst nor a gap on the way makes or
-breaks a rest::
+A robot *stands* when all of these hold (docs/safety.md, "STOP", I3):
+
+1. Its safety report says rest: below 0.02 m/s and 0.02 rad/s (``says_rest``).
+2. The rest has no gap: no report comes more than 0.5 s after the one before (0.75 s on
+   a topic that has two a second).
+3. The rest is long: five reports or more, over a second or more.
+4. No wheel moved in the last half second, by odometry.
+5. The place stays, by the poses of odometry: no motion in the last second, whatever the
+   twist says, and no jump either when the standstill begins (``domain/motion``).
+6. The newest report is at most 1.5 s old, its way included.
+
+Steps 2 to 4 are measured on the robot's own monotonic clock where it sends it, so that
+neither a burst nor a gap on the way makes or breaks a rest.  A standstill ends by
+*later* motion alone::
 
     odometry that moves      before the rest began     changes nothing, however late
                              later, once               no standstill for half a second
                              later, three in a row     contradicts the standstill
-                             nobody can say when       counts as later
-    pose that moves          whatever its twist says   no standstill
-    (``domain/motion``)      since the rest began      contradicts the standstill
+                             incomparable              counts as later
+    pose that moves          since the rest began      contradicts the standstill
 
 Two moments can be compared within one boot, if every topic's moments and stamps rise
 with its count.  No wall clock ever protects a standstill.
 
-The robot's newest report, its age, its evidence of motion, and what it allows.
-
-A release or resume that must not happen is refused here, before the machine's
+A release or resume that must not happen (I2) is refused here, before the machine's
 table, and changes nothing.
 """
 
@@ -40,8 +47,13 @@ from iveg.domain.observations import (
 from iveg.domain.stop.commands import State
 
 
+def says_rest(report: SafetyReport) -> bool:
+    """Whether a robot reports that it is at rest."""
+    return max(abs(report.linear), abs(report.angular)) < LIMITS.standing_speed
+
+
 @dataclass(frozen=True, slots=True)
-class StandstillMoment:
+class Moment:
     """Time of a measurement, on the robot's clock if it is comparable.
 
     Attributes:
@@ -52,12 +64,11 @@ class StandstillMoment:
     boot: str | None
     at: float
 
-    def since(self, earlier: "StandstillMoment") -> float | None:
+    def since(self, earlier: "Moment") -> float | None:
         """Seconds from one moment to this; None where they cannot be compared."""
         return self.at - earlier.at if self.boot == earlier.boot else None
 
 
-@dataclass(slots=True)
 class TopicOrder:
     """The count of one topic, and whether its moments and stamps rise with it.
 
@@ -65,13 +76,14 @@ class TopicOrder:
     that does not rise makes all of that boot so, since what is no clock cannot tell.
     """
 
-    _newest: Origin = field(default=UNKNOWN_ORIGIN)
-    _broken: str | None = None
+    def __init__(self) -> None:
+        self._newest = UNKNOWN_ORIGIN
+        self._broken: str | None = None
 
-    def moment(self, origin: Origin, arrived: Instant) -> StandstillMoment:
+    def moment(self, origin: Origin, arrived: Instant) -> Moment:
         """Time of measurement of a message of this topic."""
         before, self._newest = self._newest, origin
-        unknown = StandstillMoment(None, arrived.mono)
+        unknown = Moment(None, arrived.mono)
         if origin.boot is None or origin.seq is None or origin.mono is None:
             return unknown
         if before.boot == origin.boot:
@@ -79,46 +91,60 @@ class TopicOrder:
                 self._broken = origin.boot
             elif _fell(before.stamp_s, origin.stamp_s):
                 return unknown
-        return (
-            unknown
-            if self._broken == origin.boot
-            else StandstillMoment(origin.boot, origin.mono)
-        )
+        is_broken = self._broken == origin.boot
+        return unknown if is_broken else Moment(origin.boot, origin.mono)
 
 
 def _fell(before: float | None, after: float | None) -> bool:
     return before is not None and after is not None and after < before
 
 
-class Standstill:
-    """Counts samples at rest and samples that move.
+@dataclass(slots=True)
+class _Rest:
+    """Reports at rest without a gap between them.
 
     Attributes:
-        since: Arrival of the first sample of the present rest.
+        since: Arrival of the first.
+        began: Its moment; ``newest`` that of the last.
+        reports: Number of them.
+        track: Poses since it began.
     """
 
+    since: Instant
+    began: Moment
+    newest: Moment
+    reports: int = 0
+    track: MotionTrack = field(default_factory=MotionTrack)
+
+    @property
+    def is_long(self) -> bool:
+        """Step 3."""
+        lasted = self.newest.since(self.began) or 0.0
+        enough = self.reports >= LIMITS.standing_samples
+        return enough and lasted >= LIMITS.standing_for_s
+
+
+class Standstill:
+    """Steps 2 to 5: reports at rest, and odometry that contradicts them."""
+
     def __init__(self) -> None:
-        self.since: Instant | None = None
-        self._began: StandstillMoment | None = None
-        self._stood: tuple[StandstillMoment, Instant] | None = None
-        self._count = 0
-        self._newest = StandstillMoment(None, float("-inf"))
+        self._rest: _Rest | None = None
+        self._stood: tuple[Moment, Instant] | None = None
+        """The beginning of the rest that first was a standstill."""
         self._moving_samples = 0
-        self._moved: StandstillMoment | None = None
-        self._moved_at = float("-inf")
-        self._place_moved_at = self._jumped_at = float("-inf")
-        self._track = MotionTrack()
-        """Since the rest began."""
+        self._moved: tuple[Moment, float] | None = None
+        """The newest sample of odometry whose wheels moved, and its arrival (s)."""
+        self._place_moved_at = self._jumped_at = -inf
         self._reports, self._odometry = TopicOrder(), TopicOrder()
 
-    def forget(self) -> None:
-        """Discard all samples."""
-        self._stood = None
-        self._begin_anew()
+    @property
+    def since(self) -> Instant | None:
+        """Arrival of the first report of the present rest."""
+        return None if self._rest is None else self._rest.since
 
-    def _begin_anew(self) -> None:
-        self.since, self._began, self._count = None, None, 0
-        self._track = MotionTrack()
+    def forget(self) -> None:
+        """Discard all reports: a rest begins anew."""
+        self._rest = self._stood = None
 
     def rested(
         self, at: Instant, origin: Origin = UNKNOWN_ORIGIN, *, sparse: bool = False
@@ -127,39 +153,37 @@ class Standstill:
 
         ``sparse``: it came on a topic that has two reports a second, not ten.
         """
-        moment = self._reports.moment(origin, at)
-        gap = moment.since(self._newest)
+        moment, rest = self._reports.moment(origin, at), self._rest
+        gap = None if rest is None else moment.since(rest.newest)
         longest = LIMITS.standing_gap_sparse_s if sparse else LIMITS.standing_gap_s
-        if gap is None or gap > longest:
-            # Nobody knows what it did in the gap.
-            self._begin_anew()
-        if self.since is None or self._began is None:
-            self.since, self._began = at, moment
-        self._newest = moment
-        self._count += 1
-        measured = bool(
-            self._count >= LIMITS.standing_samples
-            and (moment.since(self._began) or 0.0) >= LIMITS.standing_for_s
-            and not self._moved_lately(moment, at)
+        if rest is None or gap is None or gap > longest:
+            # Step 2: nobody knows what it did in the gap.
+            rest = self._rest = _Rest(at, moment, moment)
+        rest.newest = moment
+        rest.reports += 1
+        is_standstill = (
+            rest.is_long
+            and not self._wheels_moved(moment, at)
             and not self.place_moves(at)
-            and (self._stood or at.mono - self._jumped_at > WINDOW_S)
+            and (self._stood is not None or at.mono - self._jumped_at > WINDOW_S)
         )
-        if measured and self._stood is None:
-            self._stood = self._began, self.since
-        return measured
+        if is_standstill and self._stood is None:
+            self._stood = rest.began, rest.since
+        return is_standstill
 
-    def place_moves(self, at: Instant) -> bool:
-        """Whether the robot's poses of the last second move."""
-        return at.mono - self._place_moved_at <= WINDOW_S
-
-    def _moved_lately(self, moment: StandstillMoment, at: Instant) -> bool:
-        """Whether a wheel moved in the last half second."""
+    def _wheels_moved(self, moment: Moment, at: Instant) -> bool:
+        """Step 4 fails: a wheel moved in the last half second."""
         if self._moved is None:
             return False
-        ago = moment.since(self._moved)
+        moved, arrived = self._moved
+        ago = moment.since(moved)
         # Where the robot's clock does not tell, the arrival must.
-        ago = at.mono - self._moved_at if ago is None else ago
+        ago = at.mono - arrived if ago is None else ago
         return ago < LIMITS.standing_gap_s
+
+    def place_moves(self, at: Instant) -> bool:
+        """Step 5 fails: the robot's poses of the last second move."""
+        return at.mono - self._place_moved_at <= WINDOW_S
 
     def odometry(
         self, said: Odometry, motion: Motion, at: Instant, age_s: float = inf
@@ -175,44 +199,50 @@ class Standstill:
         moment, twist = self._odometry.moment(said.origin, at), said.twist
         if self._is_before_the_rest(moment, at.mono - age_s):
             return None
-        self._place_moved_at = at.mono if motion.pose_moves else float("-inf")
+        self._place_moved_at = at.mono if motion.pose_moves else -inf
         if motion.jumped:
             self._jumped_at = at.mono
-        moves = max(abs(twist.linear_x), abs(twist.angular_z)) >= LIMITS.standing_speed
-        self._moving_samples = self._moving_samples + 1 if moves else 0
-        if moves:
-            self._moved, self._moved_at = moment, at.mono
+        self._moving_samples += 1
+        if max(abs(twist.linear_x), abs(twist.angular_z)) < LIMITS.standing_speed:
+            self._moving_samples = 0
+        else:
+            self._moved = moment, at.mono
         if self._moving_samples >= LIMITS.standing_contradicted_by:
             return True
-        if self.since is None:
+        if self._rest is None:
             return False
-        rest = self._track.note_odometry(said.pose, twist, at.mono, said.origin)
+        rest = self._rest.track.note_odometry(said.pose, twist, at.mono, said.origin)
         return rest.pose_moves
 
-    def _is_before_the_rest(self, moment: StandstillMoment, not_before: float) -> bool:
+    def _is_before_the_rest(self, moment: Moment, not_before: float) -> bool:
         """Whether the robot's own clock says so, and nothing proves it wrong."""
-        began, since = self._stood or (self._began, self.since)
-        if began is None or since is None or moment.boot is None:
+        rest = self._rest
+        if self._stood is not None:
+            began, since = self._stood
+        elif rest is not None:
+            began, since = rest.began, rest.since
+        else:
             return False
         after = moment.since(began)
-        return after is not None and after <= 0.0 and not_before <= since.mono
+        if moment.boot is None or after is None:
+            return False
+        return after <= 0.0 and not_before <= since.mono
 
 
 class StopEvidence:
-    """The newest report of one robot.
+    """The newest report of one robot, its age, and what it allows.
 
     Attributes:
         report: None before the first.
-        report_at: When it came; it was at most ``report_age_then`` old then (s).
         speed: Last measured (m/s).
-        standstill: Samples at rest and samples that move.
+        standstill: Reports at rest, and odometry that contradicts them.
     """
 
     def __init__(self, robot_id: str) -> None:
         self._robot_id = robot_id
         self.report: SafetyReport | None = None
-        self.report_at: Instant | None = None
-        self.report_age_then = 0.0
+        self._came_at, self._age_then_s = -inf, 0.0
+        """When it came (monotonic, s), and its greatest age by then (s)."""
         self.speed = 0.0
         self.standstill = Standstill()
 
@@ -226,7 +256,7 @@ class StopEvidence:
         """
         if isinf(age_s) and hold_id not in {hold.id for hold in report.holds}:
             return False
-        self.report, self.report_at, self.report_age_then = report, at, age_s
+        self.report, self._came_at, self._age_then_s = report, at.mono, age_s
         self.speed = abs(report.linear)
         return True
 
@@ -234,10 +264,9 @@ class StopEvidence:
         self, report: SafetyReport, at: Instant, *, sparse: bool
     ) -> Literal["moves", "stands"] | None:
         """Motion by the newest report; None while it is uncertain."""
-        if not stands(report):
+        if not says_rest(report):
             self.standstill.forget()
             return "moves"
-        # Five samples at rest over a second are a standstill.
         measured = self.standstill.rested(at, report.origin, sparse=sparse)
         if self.evidence_age(at) > LIMITS.report_stale_s:
             return None  # it stood; nobody knows whether it stands
@@ -246,10 +275,7 @@ class StopEvidence:
     def is_contradicted(
         self, said: Odometry, motion: Motion, at: Instant, age_s: float
     ) -> bool:
-        """Whether odometry contradicts a standstill: motion that was measured later.
-
-        This one is proven to be no older than ``age_s``.
-        """
+        """Whether odometry, at most ``age_s`` old, contradicts a standstill."""
         contradicted = self.standstill.odometry(said, motion, at, age_s)
         if contradicted is not None:
             self.speed = motion.speed if motion.moves else abs(said.twist.linear_x)
@@ -262,20 +288,20 @@ class StopEvidence:
 
     @property
     def ours(self) -> list[str]:
-        """Those of them that are STOPs of iVeg, newest last."""
+        """Reported holds that are STOPs of iVeg, newest last."""
         return [hold.id for hold in self.holds if hold.source == "iveg"]
 
     def report_age(self, now: Instant) -> float:
-        """Time since the newest report (s); infinite before the first."""
-        return inf if self.report_at is None else now.mono - self.report_at.mono
+        """Time since the newest report came (s); infinite before the first."""
+        return now.mono - self._came_at
 
     def evidence_age(self, now: Instant) -> float:
         """Greatest age of the newest report, its way included (s)."""
-        return self.report_age(now) + self.report_age_then
+        return self.report_age(now) + self._age_then_s
 
     def moved_m(self, now: Instant) -> float:
-        """How far the robot may have driven since its newest report (m)."""
-        if self.report_at is None:
+        """Distance that the robot may have driven since its newest report (m)."""
+        if self.report is None:
             return 0.0
         age = self.evidence_age(now)
         return self.speed * max(0.0, age if isfinite(age) else self.report_age(now))
@@ -307,30 +333,24 @@ class StopEvidence:
         return challenge
 
     def _check_order(
-        self, asked: str, state: State, wanted: State, at: Instant
+        self, order: str, state: State, wanted: State, at: Instant
     ) -> tuple[SafetyReport, str]:
         """The fresh report of a robot that stands, and its challenge."""
         report = self.report
         if state not in (wanted, "RUNNING"):
-            raise self._refused(asked, f"its state is {state}")
+            raise self._refused(order, f"its state is {state}")
         if report is None or not self._is_fresh(at):
-            raise self._refused(asked, "its report is not fresh")
-        if not stands(report) or self.standstill.place_moves(at):
-            raise self._refused(asked, "it is moving")
+            raise self._refused(order, "its report is not fresh")
+        if not says_rest(report) or self.standstill.place_moves(at):
+            raise self._refused(order, "it is moving")
         if report.challenge is None:
-            raise self._refused(asked, "it gave no challenge")
+            raise self._refused(order, "it gave no challenge")
         return report, report.challenge
 
-    def _refused(self, asked: str, why: str) -> CommandRefusedError:
-        return CommandRefusedError(self._robot_id, asked, why)
+    def _refused(self, order: str, why: str) -> CommandRefusedError:
+        return CommandRefusedError(self._robot_id, order, why)
 
     def _is_fresh(self, at: Instant) -> bool:
         """Whether the robot's newest report is recent, and was not old on arrival."""
-        if self.report_age(at) > LIMITS.report_fresh_s:
-            return False
-        return self.evidence_age(at) <= LIMITS.report_stale_s
-
-
-def stands(report: SafetyReport) -> bool:
-    """Whether a robot reports that it is at rest."""
-    return max(abs(report.linear), abs(report.angular)) < LIMITS.standing_speed
+        is_recent = self.report_age(at) <= LIMITS.report_fresh_s
+        return is_recent and self.evidence_age(at) <= LIMITS.report_stale_s

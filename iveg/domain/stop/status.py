@@ -1,25 +1,15 @@
-"""Everything that is kept of the STOP of one robot, and what follows from it.
+"""Orders to one robot and what is kept of its STOP, before the table decides.
 
-Earlier desired state of a robot: of an earlier run, or of an earlier STOP.
-
-One attempt to release or resume a robot, and the effect its copies can still have.
+In this order: the desired state on disk (I1), an attempt to release or resume (I2, I6),
+events and effects of the machine, the timetable of repetitions (I4), and the state that
+``machine.StopMachine`` changes.
 
 An order carries a challenge that the robot spends on the first copy, whatever it makes
 of it.  So a newer report with another challenge says that no copy can act any more:
-what it shows has come to stay.
-
-The copies go out once on each transport and come in any order, late, or not at all.
-The robot's reports decide, not its answers: one that shows the release makes it true,
-and a refusal counts once a report shows that the challenge is spent.
-
-Events of a STOP machine, and the effects that it asks for.
-
-Timetable of the repetitions of a STOP on each transport.
-
-A transport that takes any number: at 0, 250, 500 and 1000 ms, then every half second,
-after ten seconds every second; to a robot that has it every second, to a standing one
-every five.  One that takes one at a time (Orion): the next two seconds after the last
-came back, and none to a robot that has it, unless there is no other transport.
+what it shows has come to stay.  The copies go out once on each transport and come in
+any order, late, or not at all.  The robot's reports decide, not its answers: one that
+shows the release makes it true, and a refusal counts once a report shows that the
+challenge is spent.
 """
 
 from collections.abc import Iterable, Mapping
@@ -55,7 +45,7 @@ class DesiredRecord:
     """The stored desire that a robot stands.
 
     Attributes:
-        by: Who asked.
+        by: The person who asked.
         hold_id: The hold of that STOP; None where the disk does not know whether a
             release has named it.
         named: Holds that any release ever named, the last 64, newest last.
@@ -122,7 +112,7 @@ class Attempt:
     def verdict(
         self, report: SafetyReport, hold_id: str | None
     ) -> Literal["running", "ready", "refused"] | None:
-        """What a report makes of it, if that decides it.
+        """Decision of a report on it; None where it decides nothing.
 
         Args:
             report: The robot's newest.
@@ -130,7 +120,12 @@ class Attempt:
         """
         if self.command.kind == "resume" and drives(report):
             return "running"
-        if self.command.kind == "release" and _is_released(report, hold_id):
+        is_named = hold_id is None or hold_id in report.released
+        if (
+            self.command.kind == "release"
+            and is_named
+            and not _is_held(report, hold_id)
+        ):
             return "ready"
         return "refused" if self.is_refused(report, hold_id) else None
 
@@ -147,13 +142,8 @@ def drives(report: SafetyReport) -> bool:
     return not report.holds and report.speed_factor > 0
 
 
-def _is_released(report: SafetyReport, hold_id: str | None) -> bool:
-    if hold_id is None:
-        return not _is_held(report, None)
-    return not _is_held(report, hold_id) and hold_id in report.released
-
-
 def _is_held(report: SafetyReport, hold_id: str | None) -> bool:
+    """Whether our hold stands, or any that iVeg may lift where it has none."""
     if hold_id is None:
         return any(hold.ack == "remote" for hold in report.holds)
     return hold_id in {hold.id for hold in report.holds}
@@ -187,8 +177,8 @@ class Event:
 
     Attributes:
         new_id: Names the command that begins, and its hold unless one is ``kept``.
-        by: Who wants it.
-        press: What the page says of a press.
+        by: The person who wants it.
+        press: The page's account of a press.
         kept: The hold that a STOP holds on to.
         attempt: The release or resume that begins.
     """
@@ -215,7 +205,7 @@ class Event:
             robot_id,
             kind,
             "REQUESTED" if is_stop else "RELEASING",
-            Times.of(self.at, self.press),
+            Times.from_press(self.at, self.press),
             requesters=(self.by,),
             tries=0 if is_stop else 1,
             reason=None if plain else self.key,
@@ -300,23 +290,27 @@ Effect = SendStop | SendOnce | SetDesiredState | Changed | Closed | OffTable
 
 
 FIWARE_PAUSE_S = 2.0
-DELIVERED_RESEND_S = 1.0
 STANDING_RESEND_S = 5.0
+_PAUSE_S: Mapping[str, float] = {
+    "DELIVERED": 1.0,
+    "STILL_MOVING": 1.0,
+    "STANDING": STANDING_RESEND_S,
+}
+"""Between two sends to a robot that has it; to every other ``_pause`` by its age."""
 _EARLY_SENDS = (0.25, 0.5, 1.0)
 _EARLY_S = 1e-3
 """Clocks that tick in fractions meet a planned moment only nearly."""
 
-Progress = Literal["asked", "delivered", "standing"]
-"""Progress known from the robot: none, STOP received, standing still."""
-_PROGRESS: Mapping[str, Progress] = {
-    "DELIVERED": "delivered",
-    "STILL_MOVING": "delivered",
-    "STANDING": "standing",
-}
-
 
 class Sends:
-    """The timetable of one robot's STOP."""
+    """Timetable of one robot's STOP.
+
+    A transport that takes any number: at 0, 250, 500 and 1000 ms, then every half
+    second, after ten seconds every second; to a robot that has it every second, to a
+    standing one every five.  One that takes one at a time (Orion): the next two seconds
+    after the last came back, and none to a robot that has it, unless there is no other
+    transport.
+    """
 
     def __init__(self, transports: Iterable[Transport]) -> None:
         self._ways = {one.id: one for one in transports if one.can_stop}
@@ -324,7 +318,7 @@ class Sends:
         self._sent: dict[TransportId, tuple[float, float]] = {}
         """When a STOP was last sent (monotonic, s), and how old it was then (s)."""
         self._busy: set[TransportId] = set()
-        """Those of one at a time with a request under way."""
+        """Transports of one at a time with a request under way."""
         self._next: dict[TransportId, float] = {}
         """When those may be asked again (monotonic, s)."""
 
@@ -349,46 +343,38 @@ class Sends:
 
     def due(self, stop: FollowedCommand, at: Instant) -> list[SendStop]:
         """Sends that are due now; they count as sent."""
-        age_s = at.mono - stop.times.requested.mono
-        progress = _PROGRESS.get(stop.state, "asked")
         hold_id = stop.hold_id or stop.command_id
-        return [
-            SendStop(stop.robot_id, hold_id, way.id, stop.command_id)
-            for way in self._ways.values()
-            if (
-                self._is_free(way.id, at, progress)
-                if way.one_at_a_time
-                else self._is_due(way.id, at, age_s, progress)
-            )
-        ]
+        sends = []
+        for way in self._ways.values():
+            is_due = self._is_free if way.one_at_a_time else self._is_due
+            if is_due(way.id, stop, at):
+                send = SendStop(stop.robot_id, hold_id, way.id, stop.command_id)
+                sends.append(send)
+        return sends
 
-    def _is_due(
-        self, way: TransportId, at: Instant, age_s: float, progress: Progress
-    ) -> bool:
+    def _is_due(self, way: TransportId, stop: FollowedCommand, at: Instant) -> bool:
         """Whether to repeat it on a transport that takes any number."""
-        sent_at, age_then = self._sent.get(way, (float("-inf"), 0.0))
-        if at.mono - sent_at < _pause(age_then, progress) - _EARLY_S:
+        sent_at, age_then = self._sent.get(way, (-inf, 0.0))
+        pause_s = _PAUSE_S.get(stop.state, _pause(age_then))
+        if at.mono - sent_at < pause_s - _EARLY_S:
             return False
-        self._sent[way] = at.mono, age_s
+        self._sent[way] = at.mono, at.mono - stop.times.requested.mono
         return True
 
-    def _is_free(self, way: TransportId, at: Instant, progress: Progress) -> bool:
+    def _is_free(self, way: TransportId, stop: FollowedCommand, at: Instant) -> bool:
         """Whether to ask a transport that takes one at a time."""
-        if way in self._busy or (progress != "asked" and not self._is_alone):
+        if way in self._busy or (stop.state in _PAUSE_S and not self._is_alone):
             return False
-        rest = STANDING_RESEND_S - FIWARE_PAUSE_S if progress == "standing" else 0.0
-        if at.mono < self._next.get(way, 0.0) + rest:
+        stands = stop.state == "STANDING"
+        rest_s = STANDING_RESEND_S - FIWARE_PAUSE_S if stands else 0.0
+        if at.mono < self._next.get(way, 0.0) + rest_s:
             return False
         self._busy.add(way)
         return True
 
 
-def _pause(age_s: float, progress: Progress) -> float:
-    """Pause after a send at this age (s)."""
-    if progress == "standing":
-        return STANDING_RESEND_S
-    if progress == "delivered":
-        return DELIVERED_RESEND_S
+def _pause(age_s: float) -> float:
+    """Pause after a send at this age of a STOP that the robot does not have (s)."""
     for early in _EARLY_SENDS:
         if age_s < early - _EARLY_S:
             return early - age_s
@@ -399,7 +385,6 @@ class StopStatus:
     """The state of one robot's STOP.
 
     Attributes:
-        robot_id: Whose.
         stop: The STOP of this episode, as it is now.
         attempt: The release or resume under way.
         evidence: What the robot itself reports.
@@ -441,9 +426,8 @@ class StopStatus:
         return tuple(one for one in (self.stop, self.once) if one is not None)
 
     def _find(self, command_id: str) -> FollowedCommand | None:
-        return next(
-            (one for one in self.commands if one.command_id == command_id), None
-        )
+        found = (one for one in self.commands if one.command_id == command_id)
+        return next(found, None)
 
     def _keep(self, command: FollowedCommand) -> None:
         """Store the new value of one of the two commands."""

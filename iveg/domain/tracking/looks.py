@@ -3,9 +3,8 @@
 A detector that is 0.72 sure in every picture never reaches a threshold of 0.80, and is
 right nearly every time.  So its looks add up (naive Bayes, even prior)::
 
-    log-odds = Σ logit(confidence of a look)        P = 1 / (1 + e^−log-odds)
-
-A detector that somebody calibrated has an offset to each (``calibration``).
+    log-odds = Σ log-odds of a look                 P = 1 / (1 + e^−log-odds)
+    log-odds of a look = logit(confidence) + offset of the detector's calibration
 
 A detector's mistake lasts from picture to picture, so the pictures of 0.3 s are one
 look, which counts by the surest of them.  A confidence below 0.50 is no look.  Looks of
@@ -15,18 +14,18 @@ suspicion, and a second of it ends it::
     suspected ── looks or one box reach the threshold ──> confirmed
         └── odds below even, or 1 s unseen ──> over <── 1 s unseen ──┘
 
-Whoever is confirmed is kept by any box of 0.25 or more in each second, however unsure
+A confirmed suspect is kept by any box of 0.25 or more in each second, however unsure
 (as ByteTrack keeps a track), and misses count no more.  None of this lifts anything: a
-zone that is drawn goes by time or by an all-clear.
+zone that is drawn goes by time or by its own camera.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
-from iveg.domain.tracking.calibration import PLAIN, Calibration
+from iveg.domain.parameters import Class
 
 FAINT_FROM = 0.50
 KEPT_FROM = 0.25
@@ -40,15 +39,75 @@ _MISS = 1.0
 SUREST = 4.0
 """Bound of the log-odds: no number of looks makes certain (0.982)."""
 _NEAR_M = 1.0
-_FARTHEST_M = _NEAR_M + LIMITS.walking_m_s * FORGOTTEN_S
-_ROUNDING_M = 0.01
 MOST_SUSPECTS = 64
-"""Of each robot; the one not seen for longest gives way."""
+"""Suspects of each robot; the one not seen for longest gives way."""
+
+
+ANY = ""
+"""Stands for every detector that has no row of its own."""
+FARTHEST = 3.0
+"""Bound of an offset: of twenty boxes one is right, or one wrong, at an even word."""
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """Offset of one detector and class (docs/safety.md, "Calibration").
+
+    Two detectors that say 0.72 are not right equally often.  The offset changes what
+    looks add up to, and nothing else: a box at the threshold counts as the detector
+    tells it (Algorithm 2).  It is Platt's (1999) with the slope fixed at one::
+
+        offset = log(right / wrong) - logit(mean confidence of the boxes counted)
+
+    Attributes:
+        offset: Added to the log-odds that the detector tells.
+    """
+
+    offset: float = 0.0
+
+    @classmethod
+    def of_counts(cls, right: int, wrong: int, mean: float) -> "Calibration":
+        """The row of boxes that somebody compared with the truth.
+
+        Args:
+            right: So many showed what they said.
+            wrong: So many did not.  Half a box is added to both (Haldane 1956), so that
+                nothing is certain.
+            mean: Mean confidence of all of them (0 to 1, exclusive).
+        """
+        offset = math.log((right + 0.5) / (wrong + 0.5)) - logit(mean)
+        return cls(min(FARTHEST, max(-FARTHEST, offset)))
+
+    def log_odds(self, confidence: float) -> float:
+        """Log-odds of one look (confidence 0 to 1)."""
+        return logit(confidence) + self.offset
+
+
+PLAIN = Calibration()
+"""The confidence as the detector tells it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Calibrations:
+    """The rows, by detector (``ANY``: the others) and class; without one: ``PLAIN``."""
+
+    rows: Mapping[tuple[str, Class], Calibration] = field(default_factory=dict)
+
+    def row_of(self, detector: str | None, class_: Class) -> Calibration:
+        """The row for a detector's name, as its frames tell it."""
+        own = self.rows.get((detector or ANY, class_))
+        return own or self.rows.get((ANY, class_), PLAIN)
+
+
+def logit(probability: float) -> float:
+    """Log-odds, of at least 0.01 and at most 0.99."""
+    bounded = min(max(probability, 0.01), 0.99)
+    return math.log(bounded / (1.0 - bounded))
 
 
 @dataclass(frozen=True, slots=True)
 class Looks:
-    """What is known of one suspected person.
+    """All looks at one suspected person.
 
     Attributes:
         count: Number of looks; ``least`` and ``most`` sure of them (0 to 1).
@@ -126,52 +185,23 @@ class _Suspect:
         return now - self.seen_at > FORGOTTEN_S or self.odds + self.look < 0.0
 
     def reaches(self, one: FaintPerson, now: float) -> float | None:
-        """How far from it a detection is (m); None: too far to be the same."""
+        """Distance of a detection from it (m); None: too far to be the same."""
         apart = math.hypot(one.x - self.x, one.y - self.y)
         walked = LIMITS.walking_m_s * abs(now - self.seen_at)
         return apart if apart <= _NEAR_M + walked else None
 
     @property
     def log_odds(self) -> float:
-        """As they stand, without other robots' looks."""
+        """Log-odds now, without other robots' looks."""
         return min(SUREST, self.odds + self.look)
-
-
-@dataclass(slots=True)
-class _Suspected:
-    """Whom one robot suspects, and the area in ``map`` that they are in (m)."""
-
-    suspects: list[_Suspect]
-    xmin: float = math.inf
-    xmax: float = -math.inf
-    ymin: float = math.inf
-    ymax: float = -math.inf
-    newest_at: float = -math.inf
-
-    @classmethod
-    def of(cls, suspects: list[_Suspect]) -> "_Suspected":
-        """These, who stay where they are until the robot's next picture."""
-        if not suspects:
-            return cls(suspects)
-        xs, ys = [one.x for one in suspects], [one.y for one in suspects]
-        # The newest is the last.
-        newest_at = suspects[-1].seen_at
-        return cls(suspects, min(xs), max(xs), min(ys), max(ys), newest_at)
-
-    def may_have(self, one: FaintPerson, now: float) -> bool:
-        """Whether a detection may be one of them; few robots look at one place."""
-        most = _FARTHEST_M + _ROUNDING_M
-        return self.xmin - most <= one.x <= self.xmax + most and (
-            self.ymin - most <= one.y <= self.ymax + most or now < self.newest_at
-        )
 
 
 @dataclass(slots=True)
 class Suspicions:
     """Everybody whom robots suspect."""
 
-    _of: dict[tuple[str | None, str], _Suspected] = field(default_factory=dict)
-    """By recording (None: of today) and robot."""
+    _of: dict[tuple[str | None, str], list[_Suspect]] = field(default_factory=dict)
+    """Suspects by recording (None: of today) and robot."""
 
     def look(
         self,
@@ -196,13 +226,12 @@ class Suspicions:
             None for who is too faint to be suspected and continues nobody.
         """
         now, own = at.mono, (recording, observer)
-        before = self._of.get(own)
-        known = [] if before is None else _kept(before.suspects, now)
+        known = _kept(self._of.get(own, ()), now)
         free = list(known)
         found = [_match(one, free, known, calibration, now) for one in seen]
         for suspect in free:
             suspect.miss(now)
-        self._of[own] = _Suspected.of(_kept(known, now))
+        self._of[own] = _kept(known, now)
         others = [
             theirs
             for key, theirs in self._of.items()
@@ -211,7 +240,7 @@ class Suspicions:
         return [
             None
             if suspect is None
-            else _judged(suspect, _who_is(one, others, now), least)
+            else _judged(suspect, [_nearest(one, they, now) for they in others], least)
             for one, suspect in zip(seen, found, strict=True)
         ]
 
@@ -237,36 +266,22 @@ def _match(
     return suspect
 
 
-def _who_is(
-    one: FaintPerson, others: Sequence[_Suspected], now: float
-) -> list[_Suspect | None]:
-    """Whom each of the other robots that look there takes a detection for."""
-    return [
-        _nearest(one, they.suspects, now) for they in others if they.may_have(one, now)
-    ]
-
-
 def _nearest(
     one: FaintPerson, suspects: Sequence[_Suspect], now: float
 ) -> _Suspect | None:
-    found, least, x, y = None, math.inf, one.x, one.y
+    """The suspect that a detection is nearest to; None: it is too far from each."""
+    found, least = None, math.inf
     for suspect in suspects:
-        # First what nearly all fail: every box asks other robots' suspects.
-        if (
-            -_FARTHEST_M <= suspect.x - x <= _FARTHEST_M
-            # Of a late picture it may have gone farther.
-            and (-_FARTHEST_M <= suspect.y - y <= _FARTHEST_M or now < suspect.seen_at)
-        ):
-            apart = suspect.reaches(one, now)
-            if apart is not None and apart < least and not suspect.is_over(now):
-                found, least = suspect, apart
+        apart = suspect.reaches(one, now)
+        if apart is not None and apart < least and not suspect.is_over(now):
+            found, least = suspect, apart
     return found
 
 
 def _judged(
     suspect: _Suspect, others: Sequence[_Suspect | None], least: float
 ) -> Looks:
-    """What all who look at a suspect know, which may confirm it.
+    """Looks of all robots at a suspect, which may confirm it.
 
     What a robot's own looks make of it is the same whoever else looks.
     """

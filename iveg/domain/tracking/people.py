@@ -22,11 +22,12 @@ from iveg.domain.observations import (
 )
 from iveg.domain.parameters import Class
 from iveg.domain.robot_state import RobotState
-from iveg.domain.tracking.calibration import Calibration, Calibrations
 from iveg.domain.tracking.looks import (
     FAINT_FROM,
     KEPT_FROM,
     MOST_SUSPECTS,
+    Calibration,
+    Calibrations,
     FaintPerson,
     Looks,
     Suspicions,
@@ -224,20 +225,7 @@ class People:
         self.turned_away = tracks.count(None)
         for index, track in zip(wanting, tracks, strict=True):
             if track is not None:
-                one = out[index]
-                # For each box of each picture: ``replace`` takes twice as long.
-                out[index] = Placed(
-                    one.detection,
-                    one.framed,
-                    one.index,
-                    one.position,
-                    one.kind,
-                    one.class_,
-                    self.known[track],
-                    looks=one.looks,
-                    possible=one.possible,
-                    doubtful=one.doubtful,
-                )
+                out[index] = replace(out[index], person=self.known[track])
         return out
 
     def witness(
@@ -252,7 +240,7 @@ class People:
             return None
         name, x, y = report.robot_id, found.x, found.y
         seen = Sighting(name, x, y, _HEIGHT_M, at, LASER, EVEN, None, laser=True)
-        picture = [PlacedDetection("person", seen, f"{new_id}-0")]
+        picture = [PlacedDetection("person", seen, f"{new_id}-0", 0)]
         (track,) = self._tracker.track_picture(picture, at)
         return None if track is None else self.known[track]
 
@@ -292,22 +280,12 @@ def _placed(
 
 
 def _looked_at(one: Placed, looks: Looks | None) -> Placed:
-    """The same with all looks at it; a faint one counts if these confirm it."""
+    """A detection with all looks at it; a faint one counts if these confirm it."""
     if looks is None:
         return one
     possible = one.kind == "faint" and looks.confirmed
     kind = "alert" if possible else one.kind
-    # For each person of each picture: ``replace`` takes twice as long.
-    return Placed(
-        one.detection,
-        one.framed,
-        one.index,
-        one.position,
-        kind,
-        one.class_,
-        looks=looks,
-        possible=possible,
-    )
+    return replace(one, kind=kind, looks=looks, possible=possible)
 
 
 def _is_possible(one: Placed) -> bool:
@@ -335,23 +313,23 @@ def _match_peer(one: Placed, observer: RobotState, world: World, at: Instant) ->
     """
     if one.class_ != "robot":
         return one
-    nearest: tuple[float, str] | None = None
+    x, y, _ = one.position
+    near = list[tuple[float, str]]()
     for peer in world.robots.values():
-        age = peer.age_s(at)
         if peer is observer or peer.odometry is None or not peer.is_believed(at):
             continue
         if peer.recording != observer.recording:
             continue
-        reach = LIMITS.uncertainty_m
+        reach, age = LIMITS.uncertainty_m, peer.age_s(at)
         if peer.description.is_described:
             # Of a body of unknown size one sighting more is safer than one less.
             reach += peer.profile.length / 2
         if age is not None and not peer.stands:
             reach += LIMITS.walking_m_s * age
-        residual = peer.odometry.pose.distance_to(one.position[0], one.position[1])
-        if residual <= reach and (nearest is None or residual < nearest[0]):
-            nearest = (residual, peer.robot_id)
-    return one if nearest is None else replace(one, peer=nearest[1])
+        residual = peer.odometry.pose.distance_to(x, y)
+        if residual <= reach:
+            near.append((residual, peer.robot_id))
+    return replace(one, peer=min(near)[1]) if near else one
 
 
 def _sighting(one: Placed, observer: RobotState, at: Instant) -> Sighting:

@@ -5,19 +5,8 @@
     seen (<= 1 s) ──> remembered (<= 10 s, zone grows) ──> last seen (<= 600 s, no zone)
       ^________________________|                                 └──> gone
 
-Who was only glimpsed is gone sooner, and as soon as the place was seen to be empty.
-
-How far one who is tracked was ever from one spot, and how sure and fast they were.
-
-Extents are only ever joined: what one sighting of a track knew no other forgets.
-
-Things that are taken for a person: an operator's word "not a person here".
-
-A thing is a place, half a metre around it, until the end of the day at the latest.  It
-takes the zones of a track whose every sighting, and every sighting that these were ever
-taken to continue, is of a thing: inside the circle from the first on, never as fast as
-somebody who walks, and never as sure as 0.95.  So who walks in, who moves and who is
-surely seen is protected as without it (docs/safety.md, "Not a person here").
+A person who was only glimpsed is gone sooner, and as soon as the place was seen to be
+empty.
 """
 
 import math
@@ -35,7 +24,9 @@ from iveg.domain.tracking.looks import Looks
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """Of some sightings.
+    """Places, confidence and speed of some sightings.
+
+    Extents are only ever joined: no sighting of a track forgets what another one knew.
 
     Attributes:
         around: The box in ``map`` that holds every place of theirs.
@@ -60,10 +51,10 @@ class Extent:
 
 _SMOOTHED_S = 0.4
 MISTAKEN_S = 2.5
-"""What is seen for longer is no mistake of a detector, of which most last 2 s."""
+"""Longest mistake of a detector; most of them last 2 s."""
 LASER_LASTS_S = 3.0
-"""So long somebody whom only a laser saw is remembered: who or what it was is a guess,
-and beside a robot that passes, a zone that grows for longer slows it for nothing."""
+"""Memory of somebody whom only a laser saw.  It is a guess what that was, and a zone
+that grows for longer slows a robot that passes for nothing."""
 Stage = Literal["seen", "remembered", "last_seen", "gone"]
 
 
@@ -109,7 +100,7 @@ class Sighting:
 
     @property
     def kind(self) -> tuple[bool, bool, bool]:
-        """What it counts by; a chain is of one kind."""
+        """Evidence that it counts by: looks, laser, others' looks; one for a chain."""
         looks = self.looks
         is_lent = self.possible and looks is not None and looks.lent
         return self.possible, self.laser, is_lent
@@ -117,7 +108,7 @@ class Sighting:
     @property
     def lasts_s(self) -> float:
         """Age up to which it has a zone (s)."""
-        return LASER_LASTS_S if self.laser else LIMITS.ring_lasts_s
+        return LASER_LASTS_S if self.laser else LIMITS.zone_lasts_s
 
     def age_s(self, now: Instant) -> float:
         """Seconds since the sighting."""
@@ -126,33 +117,16 @@ class Sighting:
         return age_s if age_s > 0.0 else 0.0
 
     def in_chain(self, chain: int, before: "Sighting | None" = None) -> "Sighting":
-        """The same sighting as the newest of a chain, after the one ``before``."""
+        """This sighting as the newest of a chain, after the one ``before``."""
         vx, vy = (0.0, 0.0) if before is None else self._going_on(before)
         x, y = self.x, self.y
         extent = Extent(Rectangle(x, y, x, y), self.confidence, math.hypot(vx, vy))
-        # Made for each box of each picture: ``replace`` takes three times as long.
-        return Sighting(
-            self.observer,
-            self.x,
-            self.y,
-            self.z,
-            self.at,
-            self.class_id,
-            self.confidence,
-            self.looks,
-            self.reach_m,
-            chain,
-            self.recording,
-            vx,
-            vy,
-            self.possible,
-            self.laser,
-            extent if before is None else extent.joined(before.extent),
-            beyond_m=self.beyond_m,
-        )
+        if before is not None:
+            extent = extent.joined(before.extent)
+        return replace(self, chain=chain, vx=vx, vy=vy, extent=extent)
 
     def in_track(self, person: "TrackedPerson") -> "Sighting":
-        """The same, of a chain that begins in a track that is known."""
+        """This sighting as the begin of a chain in a track that is known."""
         extent = self.extent
         if extent is not None:
             for earlier in (person.newest, *person.sightings):
@@ -167,13 +141,8 @@ class Sighting:
         gain = after_s / (_SMOOTHED_S + after_s)
         vx = before.vx + gain * ((self.x - before.x) / after_s - before.vx)
         vy = before.vy + gain * ((self.y - before.y) / after_s - before.vy)
-        return of_a_walker(vx, vy)
-
-
-def of_a_walker(vx: float, vy: float) -> tuple[float, float]:
-    """A velocity, no faster than anybody walks (m/s)."""
-    least = min(1.0, LIMITS.walking_m_s / max(math.hypot(vx, vy), 1e-9))
-    return vx * least, vy * least
+        least = min(1.0, LIMITS.walking_m_s / max(math.hypot(vx, vy), 1e-9))
+        return vx * least, vy * least
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +152,6 @@ class TrackedPerson:
     Attributes:
         person_id: Of the track: the same person as long as iVeg can tell.
         sightings: The newest of each chain of sightings; each has a zone of its own.
-        number: Counts tracks in the order of their appearance.
     """
 
     person_id: str
@@ -192,7 +160,6 @@ class TrackedPerson:
     first_seen: Instant
     newest: Sighting
     sightings: tuple[Sighting, ...]
-    number: int = 0
 
     def age_s(self, now: Instant) -> float:
         """Seconds since the newest sighting by any robot."""
@@ -205,7 +172,7 @@ class TrackedPerson:
 
     @property
     def middle(self) -> tuple[float, float]:
-        """Of the places where it has been, in ``map`` (m)."""
+        """Middle of the places where they have been, in ``map`` (m)."""
         extent = self.newest.extent
         if extent is None:
             return self.newest.x, self.newest.y
@@ -216,29 +183,6 @@ class TrackedPerson:
         """Whether every zone is one of looks alone."""
         zones = self.sightings
         return bool(zones) and all(one.possible for one in zones)
-
-    def seen_as(
-        self,
-        newest: Sighting,
-        sightings: tuple[Sighting, ...],
-        decision_id: str | None = None,
-    ) -> "TrackedPerson":
-        """The same person, seen otherwise.
-
-        Args:
-            newest: The newest sighting.
-            sightings: The newest of each chain.
-            decision_id: Of a new alert, if any.
-        """
-        return TrackedPerson(
-            self.person_id,
-            self.class_,
-            decision_id or self.decision_id,
-            self.first_seen,
-            newest,
-            sightings,
-            self.number,
-        )
 
     def stage(self, now: Instant) -> Stage:
         """The stage of life of the newest sighting."""
@@ -286,7 +230,13 @@ LONGEST_S = 86_400.0
 
 @dataclass(frozen=True, slots=True)
 class Thing:
-    """One word of an operator.
+    """One word of an operator: "not a person here".
+
+    A thing is a place, half a metre around it, until the end of the day at the latest.
+    It takes the zones of a track if all its sightings, and all that these were ever
+    taken to continue, are of the thing: within half a metre from the first on, slower
+    than a walker, less sure than 0.95.  A person who walks in, moves or is surely seen
+    is protected as without it (docs/safety.md, "Not a person here").
 
     Attributes:
         x: Of its middle in ``map`` (m); ``y`` likewise.

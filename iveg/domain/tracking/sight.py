@@ -1,14 +1,16 @@
-"""Lines of sight: what one frame of a camera shows, and the end of its own zones.
+"""Lines of sight: what a frame of a camera shows, and how zones and trust end by it.
 
 A zone goes by time, or because the camera that made it has had its centre in view for a
 second and found nobody, not even faintly; never for one missing frame, and never by the
-word of another (docs/safety.md, "Age").
+word of another (docs/safety.md, "Age").  A camera that misses somebody whom another one
+surely sees is blind.
 """
 
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,12 +25,13 @@ from iveg.domain.tracking.looks import KEPT_FROM
 from iveg.domain.tracking.people import People, Placed
 from iveg.domain.tracking.person import Sighting, TrackedPerson
 from iveg.domain.words import meaning_of
+from iveg.domain.world import World
 
 CLEAR_S, CLEAR_FRAMES = 1.0, 5
 SUSPECT_M = 1.0
-"""So near to a place a box may be of whoever was there."""
+"""A box so near to a place may be of the person who was there."""
 _EDGE_RAD = math.radians(5.0)
-"""So far inside the picture that a person there would be seen whole."""
+"""Margin inside the picture within which a person is seen whole."""
 _NEAR_M, _RANGE_SHARE = 1.0, 0.75
 _FRESH_S = 0.5
 """A frame that took longer, or came so long after the one before, proves nothing."""
@@ -41,7 +44,7 @@ _NONE = np.empty(0, np.intp)
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What one frame of a camera shows.
+    """Content of one frame of a camera.
 
     Attributes:
         camera: Where it was made, in ``map``; None: it proves nothing to be empty.
@@ -94,7 +97,7 @@ class Look:
         return any(math.dist(one, (x, y)) <= within_m for one in self.people)
 
     def shows(self, person: TrackedPerson, x: float, y: float) -> bool:
-        """The same of a person or robot that was seen there; an unknown word counts."""
+        """Whether a box may be of this person or robot; an unknown word counts."""
         others = (*self.unknown, *(self.robots if person.class_ == "robot" else ()))
         near = any(math.dist(one, (x, y)) <= SUSPECT_M for one in others)
         return near or self.shows_person_at(x, y)
@@ -183,7 +186,7 @@ class _Watch:
     frames: int = 0
 
     def going_on(self, at: float) -> "_Watch":
-        """With one more frame that shows nobody."""
+        """The watch after one more frame that shows nobody."""
         is_first = self.frames == 0 or at - self.newest > _FRESH_S
         since, frames = (at, 1) if is_first else (self.since, self.frames + 1)
         return replace(self, since=since, newest=at, frames=frames)
@@ -201,7 +204,7 @@ class OwnSight:
     def __init__(self, greenhouse: Greenhouse) -> None:
         self._greenhouse = greenhouse
         self._watched: dict[str, Mapping[int, _Watch]] = {}
-        """By robot and chain."""
+        """Watches by robot and chain."""
 
     def take(self, look: Look, people: People) -> list[TrackedPerson]:
         """Take a frame that ``people`` has taken in; returns whose zones it ended."""
@@ -306,3 +309,121 @@ def _sides(
         for deep, place, is_seen in sides
         if deep <= LIMITS.uncertainty_m and (here is None or is_seen)
     ]
+
+
+# --- blind cameras ----------------------------------------------------------------
+
+BLIND_S = 5.0
+_HIDES_M = 0.5
+"""Half of a person who stands between, and the error of a place."""
+
+
+class _Spell(NamedTuple):
+    """From the first to the newest frame without them (monotonic, s)."""
+
+    began: float
+    newest: float
+
+
+class BlindCameras:
+    """Finds cameras that report nothing where another one surely sees somebody.
+
+    A covered lens sends empty frames, which look like an empty aisle.  A person who
+    stands for five seconds in the view of two cameras and is seen by one of them alone
+    tells them apart.  From then on no frame of the other is whole (docs/safety.md,
+    "Clear"), until it shows somebody again.
+    """
+
+    def __init__(self, greenhouse: Greenhouse) -> None:
+        self._greenhouse = greenhouse
+        self._missing: dict[str, dict[int, _Spell]] = {}
+        """Spells by robot, and chain of the other one."""
+
+    def take(self, look: Look, people: People, world: World) -> None:
+        """Take a frame that ``people`` has taken in.
+
+        A frame that proves nothing (late, or somebody walks between) ends no spell:
+        more than a second without a frame that does is silence, which slows anyway.
+        """
+        robot, now = look.robot, look.at.mono
+        detector, before = robot.detector, self._missing.get(robot.robot_id, {})
+        spells = self._missing[robot.robot_id] = {
+            chain: one
+            for chain, one in before.items()
+            if now - one.newest <= LIMITS.silence_s + 1e-6
+        }
+        for one, is_shown in self._sought(look, people, world):
+            if is_shown:
+                spells.pop(one.chain, None)
+                continue
+            began = spells.get(one.chain, _Spell(now, now)).began
+            spells[one.chain] = _Spell(began, now)
+            if now - began >= BLIND_S - 1e-6:
+                detector.blind_by = one.observer
+        if detector.out_of_service is not None or (look.people and not spells):
+            detector.blind_by = None
+        if detector.blind_by is not None:
+            detector.note_flaw("blind", look.at)
+
+    def _sought(
+        self, look: Look, people: People, world: World
+    ) -> Iterator[tuple[Sighting, bool]]:
+        """People in view whom another camera surely sees, and whether this one does."""
+        camera, reach_m = look.camera, look.robot.profile.camera_range
+        seen = [
+            one
+            for person in people.known.values()
+            if person.class_ == "person"
+            for one in person.sightings
+            if one.age_s(look.at) <= LIMITS.seen_s
+            and one.recording is None
+            and (camera is None or camera.distance_to(one.x, one.y) <= reach_m)
+        ]
+        sure = [one for one in seen if _is_sure(one, look, world)]
+        in_view = look.in_view([(one.x, one.y) for one in sure], self._greenhouse)
+        for index, one in enumerate(sure):
+            near_m = SUSPECT_M + LIMITS.walking_m_s * one.age_s(look.at)
+            if look.shows_person_at(one.x, one.y, near_m):
+                yield one, True
+            elif camera is not None and index in in_view:
+                beside = ((two.x, two.y, _HIDES_M) for two in seen)
+                if not self._is_hidden(one, camera, [*beside, *_peers(look, world)]):
+                    yield one, False
+
+    def _is_hidden(
+        self, one: Sighting, camera: Pose2D, bodies: list[tuple[float, float, float]]
+    ) -> bool:
+        """Whether crates, somebody or a peer stands between a camera and somebody."""
+        here, there = (camera.x, camera.y), (one.x, one.y)
+        return any(
+            each.area.crosses(*here, *there) for each in self._greenhouse.obstacles
+        ) or any(
+            math.dist((x, y), there) > _HIDES_M and _off((x, y), here, there) <= radius
+            for x, y, radius in bodies
+        )
+
+
+def _is_sure(one: Sighting, look: Look, world: World) -> bool:
+    """Whether a sighting is another camera's, by a box, of a robot beyond doubt."""
+    if one.observer == look.robot.robot_id or one.possible or one.laser or one.reach_m:
+        return False
+    observer = world.robot(one.observer)
+    return observer.is_believed(look.at) and not observer.detector.is_flawed(look.at)
+
+
+def _peers(look: Look, world: World) -> Iterator[tuple[float, float, float]]:
+    """Bodies of peers: x, y and half of their length, and the error of a place (m)."""
+    for robot in world.live_robots():
+        is_peer = robot is not look.robot and robot.is_believed(look.at)
+        if is_peer and robot.odometry is not None:
+            pose, profile = robot.odometry.pose, robot.profile
+            half = math.hypot(profile.length, profile.width) / 2
+            yield pose.x, pose.y, half + LIMITS.uncertainty_m
+
+
+def _off(place: _Place, start: _Place, end: _Place) -> float:
+    """Distance of a place from the line between two others (m)."""
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    along = (place[0] - start[0]) * dx + (place[1] - start[1]) * dy
+    share = min(1.0, max(0.0, along / max(dx * dx + dy * dy, 1e-9)))
+    return math.dist(place, (start[0] + share * dx, start[1] + share * dy))

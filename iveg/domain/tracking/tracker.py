@@ -4,26 +4,17 @@ Each frame of one robot is taken in two layers.
 
 *Chains* (protection).  A sighting continues the chain of its own observer whose last
 sighting is near enough, and replaces that sighting alone; else it begins a chain.  Only
-time or an all-clear ends a chain's zone.  Tracks play no part in it.
+time or its own camera ends a chain's zone.  Tracks play no part in it.
 
 *Tracks* (names).  A chain that goes on keeps its track.  One that begins joins the
-nearest live track (global assignment over the whole picture), else it begins a track:
-who comes back after a gap has a new number.  Live tracks closer than half a metre
-become one.  Two that were ever seen apart at once never do.
-
-Ids of tracks: unique for ever, with a number that starts anew each day (UTC).
-
-Global assignment: as many pairs as can be, and of those the cheapest in sum.
-
-The Hungarian method by shortest augmenting paths with potentials (Kuhn 1955; Jonker and
-Volgenant 1987), O(n^3); pictures hold few people, so n is small.
-
-One picture as the tracker takes it, and its distances to who is known already.
+nearest live track (global assignment over the whole picture), else it begins a track: a
+person who comes back after a gap has a new number.  Live tracks closer than half a
+metre become one.  Two that were ever seen apart at once never do.
 """
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,10 +51,14 @@ class TrackNumbers:
         return f"{kind}{self._shown}" + (self.era and f"{self.era}{day:x}")
 
 
+# --- assignment -------------------------------------------------------------------
+#
+# As many pairs as can be, and of those the cheapest in sum: the Hungarian method by
+# shortest augmenting paths with potentials (Kuhn 1955; Jonker and Volgenant 1987),
+# O(n^3); pictures hold few people, so n is small.
+
 _NEVER = 1e9
 """Stands for a pair that cannot be; far above any sum of distances (m)."""
-_PLAINLY = 1e-3
-"""So much cheaper (m) is cheaper, however sums beside ``_NEVER`` are rounded."""
 _FREE = -1
 
 
@@ -78,34 +73,12 @@ def assign(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]]:
     """
     if not costs or not costs[0]:
         return []
-    plain = _undisputed(costs)
-    if plain is not None:
-        return plain
     table = np.minimum(np.array(costs), _NEVER)
     if len(costs) > len(costs[0]):
         pairs = sorted((row, column) for column, row in _matched(table.T))
     else:
         pairs = _matched(table)
     return [(row, column) for row, column in pairs if math.isfinite(costs[row][column])]
-
-
-def _undisputed(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]] | None:
-    """The pairs where each row has what is plainly its cheapest, no two the same.
-
-    Else None.  No other pairs are as many and as cheap: a row that had another column,
-    or none, would cost more.  So it is nearly always: each person in a picture is near
-    one place.
-    """
-    pairs = []
-    for row, offers in enumerate(costs):
-        least = min(offers)
-        if least >= _NEVER:
-            continue
-        if sum([cost < least + _PLAINLY for cost in offers]) > 1:
-            return None
-        pairs.append((row, offers.index(least)))
-    taken = {column for _, column in pairs}
-    return pairs if len(taken) == len(pairs) else None
 
 
 def _matched(costs: NDArray[np.float64]) -> list[tuple[int, int]]:
@@ -136,6 +109,8 @@ def _matched(costs: NDArray[np.float64]) -> list[tuple[int, int]]:
     return [(row, int(column)) for row, column in enumerate(column_of)]
 
 
+# --- distances --------------------------------------------------------------------
+
 GATE_M, GATE_CAP_M = 1.0, 2.0
 
 
@@ -145,109 +120,89 @@ class PlacedDetection:
 
     Attributes:
         decision_id: Of the alert, should this begin a track.
-        same_as: Index in the picture of the first place of the same box, which may be
-            its own; None: its own.  Every further place joins the track of the first.
+        first: Index in the picture of the first place of the same box, mostly its own.
+            Every further place joins the track of the first.
     """
 
     class_: Class
     sighting: Sighting
     decision_id: str
-    same_as: int | None = None
-
-    def first_place(self, index: int) -> int:
-        """Index of the first place of its box; ``index`` is its own."""
-        return index if self.same_as is None else self.same_as
+    first: int
 
 
-def first_places(picture: Sequence[PlacedDetection]) -> list[int]:
-    """Indices of the boxes' first places."""
-    return [
-        index for index, one in enumerate(picture) if one.first_place(index) == index
-    ]
+_Chain = tuple[str, Sighting]
+"""A chain that goes on: its track, and the sighting that is replaced."""
 
 
-def is_alike(person: TrackedPerson, one: PlacedDetection) -> bool:
+def _is_alike(person: TrackedPerson, one: PlacedDetection) -> bool:
     """Whether they can be one: of a class, and of the same map."""
     frame = person.newest.recording
     return person.class_ == one.class_ and frame == one.sighting.recording
 
 
-def chain_cost(
+def _chain_cost(
     one: PlacedDetection, person: TrackedPerson, earlier: Sighting, at: Instant
 ) -> float:
     """Distance to the observer's own earlier sighting (m); inf for another person's.
 
     A sighting that counts by its looks alone replaces none that counts by its box:
-    looks add zones, and take none away.
+    looks add zones, and take none away.  A laser may see somebody else than a camera.
     """
     here = one.sighting
-    # First what nearly all fail: in a storm this is asked of everybody.
-    is_placed = not (earlier.reach_m or here.reach_m)
-    if is_placed and not (
-        -GATE_CAP_M <= earlier.x - here.x <= GATE_CAP_M
-        and -GATE_CAP_M <= earlier.y - here.y <= GATE_CAP_M
-    ):
+    if not _is_alike(person, one) or bool(earlier.reach_m) != bool(here.reach_m):
         return math.inf
-    if not is_alike(person, one) or bool(earlier.reach_m) != bool(here.reach_m):
-        return math.inf
-    # A laser may see another one: what a camera saw stays.  So does what a robot's own
-    # looks made of it, where another's word makes somebody of a look of its own.
     if earlier.kind != here.kind:
         return math.inf
-    if earlier.reach_m:
-        return 0.0
-    distance = distance_between(earlier, here)
-    return distance if distance <= _gate(earlier, at) else math.inf
+    return 0.0 if earlier.reach_m else _gated(earlier, here, at)
 
 
-def is_replaced(earlier: Sighting, sighting: Sighting, at: Instant) -> bool:
-    """Whether a box shows where somebody is who counted by the observer's looks."""
-    return (
-        earlier.possible
-        and not sighting.possible
-        and earlier.observer == sighting.observer
-        and not (earlier.reach_m or sighting.reach_m)
-        and distance_between(earlier, sighting) <= _gate(earlier, at)
-    )
-
-
-def live_cost(one: PlacedDetection, person: TrackedPerson, at: Instant) -> float:
+def _live_cost(one: PlacedDetection, person: TrackedPerson, at: Instant) -> float:
     """Distance to the nearest fresh sighting by anybody (m); inf beyond its gate.
 
     Where two robots see one person with noise, a detection that lies far from the one
     sighting seldom lies far from both.
     """
     here = one.sighting
-    if not is_alike(person, one) or here.reach_m:
+    if not _is_alike(person, one) or here.reach_m:
         return math.inf
-    return min(
-        (
-            distance
-            for earlier in person.sightings
-            # First what nearly all fail: in a storm this is asked of everybody.
-            if abs(earlier.x - here.x) <= GATE_CAP_M
-            and abs(earlier.y - here.y) <= GATE_CAP_M
-            and not earlier.reach_m
-            and earlier.age_s(at) <= LIMITS.seen_s
-            and (distance := distance_between(earlier, here)) <= _gate(earlier, at)
-        ),
-        default=math.inf,
+    fresh = (
+        earlier
+        for earlier in person.sightings
+        if not earlier.reach_m and earlier.age_s(at) <= LIMITS.seen_s
     )
+    return min((_gated(earlier, here, at) for earlier in fresh), default=math.inf)
 
 
-def distance_between(one: Sighting, other: Sighting) -> float:
+def _gated(earlier: Sighting, here: Sighting, at: Instant) -> float:
+    """Distance to an earlier sighting (m); inf if nobody walked so far since."""
+    if abs(earlier.x - here.x) > GATE_CAP_M:
+        return math.inf
+    walked_m = LIMITS.walking_m_s * abs(at.mono - earlier.at.mono)
+    distance = _distance(earlier, here)
+    return distance if distance <= min(GATE_CAP_M, GATE_M + walked_m) else math.inf
+
+
+def _distance(one: Sighting, other: Sighting) -> float:
     """Horizontal distance between two sightings (m)."""
     return math.hypot(one.x - other.x, one.y - other.y)
 
 
-def _gate(earlier: Sighting, at: Instant) -> float:
-    """How far one may have walked since a sighting (m, capped)."""
-    return min(GATE_CAP_M, GATE_M + LIMITS.walking_m_s * abs(at.mono - earlier.at.mono))
+def _is_replaced(earlier: Sighting, sighting: Sighting, at: Instant) -> bool:
+    """Whether a box shows where somebody is who counted by the observer's looks."""
+    return (
+        earlier.possible
+        and not sighting.possible
+        and earlier.observer == sighting.observer
+        and not (earlier.reach_m or sighting.reach_m)
+        and math.isfinite(_gated(earlier, sighting, at))
+    )
 
+
+# --- tracks -----------------------------------------------------------------------
 
 MAX_PEOPLE, MAX_POSSIBLE, MAX_WALKERS = 256, 64, 8
-"""Who counts by looks, and whom only lasers saw, take no place of others; of the last
-each robot has its own places, so that none takes another's."""
+"""People who count by looks, and whom only lasers saw, take no place of others; of the
+last each robot has its own places, so that none takes another's."""
 MERGE_M = 0.5
 _APART_M = 3.0
 """Farther from each other, at once, are two: beyond noise and a second's walk."""
@@ -266,7 +221,6 @@ class Tracker:
     numbers: TrackNumbers = field(default_factory=TrackNumbers)
     known: dict[str, TrackedPerson] = field(default_factory=dict)
     _chains: int = 0
-    _tracks: int = 0
     _together: dict[str, set[str]] = field(default_factory=dict)
 
     def track_picture(
@@ -277,15 +231,14 @@ class Tracker:
         Returns:
             The track of each detection; None where no more can be kept.
         """
-        chains = self._continue_chains(picture, at)
-        tracks = self._choose_tracks(picture, chains, at)
+        chains = self._continued_chains(picture, at)
+        tracks = self._tracks_of(picture, chains, at)
         numbers: list[int] = []
         for index, (one, old) in enumerate(zip(picture, chains, strict=True)):
-            first = one.first_place(index)
             # The chain of a further place has its first one's number, negative.
-            number = self._number_of(old) if first == index else -numbers[first]
-            numbers.append(number)
-            tracks[index] = self._put(one, number, old, tracks[first], at)
+            is_first = one.first == index
+            numbers.append(self._number_of(old) if is_first else -numbers[one.first])
+            tracks[index] = self._put(one, numbers[index], old, tracks[one.first], at)
         named = [track for track in tracks if track is not None]
         self._remember_together(named)
         merged = dict(self._merge(dict.fromkeys(named), at))
@@ -295,7 +248,7 @@ class Tracker:
         """Drop a sighting whose place its own camera saw to be empty."""
         person = self.known[person_id]
         left = tuple(earlier for earlier in person.sightings if earlier != sighting)
-        person = self.known[person_id] = person.seen_as(person.newest, left)
+        person = self.known[person_id] = replace(person, sightings=left)
         return person
 
     def forget(self, now: Instant) -> list[TrackedPerson]:
@@ -305,13 +258,11 @@ class Tracker:
             self._remove(person.person_id)
         return gone
 
-    # --- chains -------------------------------------------------------------------
-
-    def _continue_chains(
+    def _continued_chains(
         self, picture: Sequence[PlacedDetection], at: Instant
-    ) -> list[tuple[str, Sighting] | None]:
+    ) -> list[_Chain | None]:
         """For each detection the earlier sighting that it replaces, and its track."""
-        out: list[tuple[str, Sighting] | None] = [None] * len(picture)
+        out: list[_Chain | None] = [None] * len(picture)
         if not picture:
             return out
         observer = picture[0].sighting.observer
@@ -321,33 +272,29 @@ class Tracker:
             for earlier in person.sightings
             if earlier.observer == observer
             and earlier.chain > 0
-            and earlier.age_s(at) <= LIMITS.ring_lasts_s
+            and earlier.age_s(at) <= LIMITS.zone_lasts_s
         ]
         for is_live in (True, False):
-            wanting = [index for index in first_places(picture) if out[index] is None]
-            if not wanting:
-                break
+            wanting = _without(picture, out)
             offered = [
                 (person, earlier)
                 for person, earlier in own
                 if (earlier.age_s(at) <= LIMITS.seen_s) is is_live
             ]
             costs = [
-                [chain_cost(picture[i], *pair, at) for pair in offered] for i in wanting
+                [_chain_cost(picture[i], *pair, at) for pair in offered]
+                for i in wanting
             ]
             for row, column in assign(costs):
                 person, earlier = offered[column]
                 out[wanting[row]] = person.person_id, earlier
         return [
-            old if one.first_place(index) == index else self._beside(out, one)
+            old if one.first == index else self._beside(out[one.first])
             for index, (one, old) in enumerate(zip(picture, out, strict=True))
         ]
 
-    def _beside(
-        self, chains: Sequence[tuple[str, Sighting] | None], one: PlacedDetection
-    ) -> tuple[str, Sighting] | None:
-        """What a further place replaces: the one beside what its first replaces."""
-        first = None if one.same_as is None else chains[one.same_as]
+    def _beside(self, first: _Chain | None) -> _Chain | None:
+        """The sighting that a further place replaces: beside that of its first."""
         if first is None:
             return None
         track, replaced = first
@@ -356,57 +303,42 @@ class Tracker:
                 return track, earlier
         return None
 
-    def _number_of(self, old: tuple[str, Sighting] | None) -> int:
+    def _number_of(self, old: _Chain | None) -> int:
         """Number of the chain that goes on, or of a new one."""
         if old is not None:
             return old[1].chain
         self._chains += 1
         return self._chains
 
-    # --- tracks -------------------------------------------------------------------
-
-    def _choose_tracks(
+    def _tracks_of(
         self,
         picture: Sequence[PlacedDetection],
-        chains: Sequence[tuple[str, Sighting] | None],
+        chains: Sequence[_Chain | None],
         at: Instant,
     ) -> list[str | None]:
-        tracks: list[str | None] = [None] * len(picture)
-        firsts = first_places(picture)
-        for index in firsts:
-            old = chains[index]
-            if old is not None:
-                tracks[index] = old[0]
-        self._assign_tracks(picture, tracks, at)
-        return tracks
-
-    def _assign_tracks(
-        self,
-        picture: Sequence[PlacedDetection],
-        tracks: list[str | None],
-        at: Instant,
-    ) -> None:
-        """Assign free live tracks to detections without one."""
-        wanting = [index for index in first_places(picture) if tracks[index] is None]
-        if not wanting:
-            return
+        """The track of each chain that goes on; a new one is offered the live ones."""
+        tracks = [None if old is None else old[0] for old in chains]
+        wanting = _without(picture, tracks)
         taken = set(tracks)
         offered = [
             person
             for person in self.known.values()
-            if person.person_id not in taken and person.age_s(at) <= LIMITS.seen_s
+            if wanting
+            and person.person_id not in taken
+            and person.age_s(at) <= LIMITS.seen_s
         ]
         costs = [
-            [live_cost(picture[i], person, at) for person in offered] for i in wanting
+            [_live_cost(picture[i], person, at) for person in offered] for i in wanting
         ]
         for row, column in assign(costs):
             tracks[wanting[row]] = offered[column].person_id
+        return tracks
 
     def _put(
         self,
         one: PlacedDetection,
         chain: int,
-        old: tuple[str, Sighting] | None,
+        old: _Chain | None,
         track: str | None,
         at: Instant,
     ) -> str | None:
@@ -426,17 +358,20 @@ class Tracker:
         kept = tuple(
             earlier
             for earlier in person.sightings
-            if earlier.age_s(at) <= LIMITS.ring_lasts_s
-            and not is_replaced(earlier, sighting, at)
+            if earlier.age_s(at) <= LIMITS.zone_lasts_s
+            and not _is_replaced(earlier, sighting, at)
         )
-        later = sighting.at.mono > person.newest.at.mono
         # Where a camera sees somebody, what a laser sees there says no more of them.
         is_beside = sighting.laser and not person.newest.laser
         is_beside &= person.age_s(at) <= LIMITS.seen_s
-        newest = sighting if later and not is_beside else person.newest
-        had_ring = person.age_s(at) <= LIMITS.ring_lasts_s
-        decision_id = person.decision_id if had_ring else one.decision_id
-        self.known[track] = person.seen_as(newest, (*kept, sighting), decision_id)
+        later = sighting.at.mono > person.newest.at.mono and not is_beside
+        had_zone = person.age_s(at) <= LIMITS.zone_lasts_s
+        self.known[track] = replace(
+            person,
+            newest=sighting if later else person.newest,
+            sightings=(*kept, sighting),
+            decision_id=person.decision_id if had_zone else one.decision_id,
+        )
         return track
 
     def _begin(
@@ -445,35 +380,28 @@ class Tracker:
         if not self._has_room(at, sighting):
             return None
         self._end_marks(one, sighting, at)
-        self._tracks += 1
         kind = "P" if one.class_ == "person" else "R"
         track = self.numbers.next_id(kind, at, self.known)
         self.known[track] = TrackedPerson(
-            track,
-            one.class_,
-            one.decision_id,
-            at,
-            sighting,
-            (sighting,),
-            self._tracks,
+            track, one.class_, one.decision_id, at, sighting, (sighting,)
         )
         self._remember_apart(track, sighting, at)
         return track
 
     def _end_marks(self, one: PlacedDetection, here: Sighting, at: Instant) -> None:
-        """Forget who was last seen where somebody is seen now."""
+        """Forget marks of people who were last seen where somebody is seen now."""
         for person in list(self.known.values()):
             last = person.newest
-            is_mark = person.stage(at) == "last_seen" and is_alike(person, one)
+            is_mark = person.stage(at) == "last_seen" and _is_alike(person, one)
             is_placed = not (last.reach_m or here.reach_m)
-            if is_mark and is_placed and distance_between(last, here) <= GATE_M:
+            if is_mark and is_placed and _distance(last, here) <= GATE_M:
                 self._remove(person.person_id)
 
     def _has_room(self, now: Instant, newest: Sighting) -> bool:
         """Whether one more can be kept, if need be in place of one without a zone.
 
-        Persons with a zone, and persons who were seen twice, stay.  Who counts by looks
-        or a laser alone takes no place from one who counts by a box.
+        Persons with a zone, and persons who were seen twice, stay.  A person who counts
+        by looks or a laser alone takes no place from one who counts by a box.
         """
         walkers = [one for one in self.known.values() if one.newest.laser]
         if newest.laser:
@@ -517,38 +445,33 @@ class Tracker:
                 and other.person_id != track
                 and not (seen.reach_m or here.reach_m)
                 and seen.recording == here.recording
-                and distance_between(seen, here) > _APART_M
+                and _distance(seen, here) > _APART_M
             ):
-                self._together.setdefault(track, set()).add(other.person_id)
-                self._together.setdefault(other.person_id, set()).add(track)
+                self._remember_together((track, other.person_id))
 
     def _merge(self, touched: Iterable[str], at: Instant) -> Iterator[tuple[str, str]]:
         """Join live tracks that stand at one spot; yields the changed names."""
         for track in touched:
             while track in self.known and (twin := self._twin_of(track, at)):
-                first, second = sorted(
-                    (track, twin), key=lambda name: self.known[name].number
-                )
+                first, second = sorted((track, twin), key=[*self.known].index)
                 self._join(first, second)
                 yield second, first
 
     def _twin_of(self, track: str, at: Instant) -> str | None:
-        person, most = self.known[track], self.merge_m
-        if person.newest.reach_m:
-            return None
-        apart, x, y = self._together.get(track, set()), person.newest.x, person.newest.y
+        person, apart = self.known[track], self._together.get(track, set())
+        here = person.newest
         for other in self.known.values():
+            newest = other.newest
             if (
-                # First what nearly all fail: in a storm this is asked of everybody.
-                -most <= (newest := other.newest).x - x <= most
-                and -most <= newest.y - y <= most
+                # First what nearly all fail: in a storm this looks at everybody.
+                abs(newest.x - here.x) <= self.merge_m
+                and _distance(newest, here) <= self.merge_m
                 and other is not person
                 and other.class_ == person.class_
-                and newest.recording == person.newest.recording
+                and newest.recording == here.recording
                 and other.person_id not in apart
                 and other.age_s(at) <= LIMITS.seen_s
-                and not newest.reach_m
-                and distance_between(newest, person.newest) <= most
+                and not (newest.reach_m or here.reach_m)
             ):
                 return other.person_id
         return None
@@ -560,12 +483,20 @@ class Tracker:
         found = [one.in_track(older) for one in (younger.newest, *younger.sightings)]
         newest = max(older.newest, found[0], key=lambda sighting: sighting.at.mono)
         sightings = (*older.sightings, *found[1:])
-        self.known[first] = older.seen_as(newest, sightings)
+        self.known[first] = replace(older, newest=newest, sightings=sightings)
         apart = self._together.get(second, set()) - {first}
         self._remove(second)
-        self._together.setdefault(first, set()).update(apart)
         for other in apart:
-            self._together[other].add(first)
+            self._remember_together((first, other))
+
+
+def _without(picture: Sequence[PlacedDetection], found: Sequence[object]) -> list[int]:
+    """Indices of the boxes' first places for which nothing was found."""
+    return [
+        index
+        for index, one in enumerate(picture)
+        if one.first == index and found[index] is None
+    ]
 
 
 def _name_now(track: str | None, merged: Mapping[str, str]) -> str | None:

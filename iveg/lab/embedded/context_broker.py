@@ -8,6 +8,7 @@ import asyncio
 import re
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import orjson
 from starlette.applications import Starlette
@@ -16,27 +17,26 @@ from starlette.responses import Response
 
 from iveg.adapters import clock
 from iveg.lab.embedded.entities import (
+    Attribute,
     Endpoint,
     Entity,
-    EntityChange,
     EntityView,
     FiwareError,
     Scope,
-    apply,
     bad_request,
     check_name,
     check_value,
     fiware_app,
     load_object,
     looks_clean,
+    new_id,
     not_found,
     not_supported,
     write_entity,
 )
-from iveg.lab.embedded.subscriptions import Outbox, Subscription, read_subscription
+from iveg.lab.embedded.subscriptions import Outbox, Subscription
 
 PATIENCE_S = 5.0
-_MOST_CONCERNED = 10_000
 Provider = Callable[[Scope, str, str, Mapping[str, object]], Awaitable[None]]
 """Carries out commands of an entity: its id, its type, and the values by name."""
 
@@ -57,7 +57,12 @@ class Registration:
     attrs: tuple[str, ...]
     url: str
 
-    def show(self) -> dict[str, object]:
+    def provides(self, path: str, entity_id: str, kind: str, name: str) -> bool:
+        """Whether an attribute of an entity is among them."""
+        mine = self.path, self.entity_id, self.entity_type
+        return mine == (path, entity_id, kind) and name in self.attrs
+
+    def show(self) -> dict[str, Any]:
         """The registration as a client gets it."""
         entity = {"id": self.entity_id, "type": self.entity_type}
         return {
@@ -79,39 +84,6 @@ class Tenant:
     entities: dict[tuple[str, str, str], Entity] = field(default_factory=dict)
     subscriptions: dict[str, Subscription] = field(default_factory=dict)
     registrations: dict[str, Registration] = field(default_factory=dict)
-    _concerned: dict[object, tuple[Subscription, ...]] = field(default_factory=dict)
-    """By entity and attributes; cleared at every change of a subscription."""
-
-    def concerned(
-        self, entity: Entity, names: tuple[str, ...]
-    ) -> tuple[Subscription, ...]:
-        """Subscriptions that a change of these attributes may concern."""
-        known = self._concerned.get(key := (entity.key, names))
-        if known is None:
-            if len(self._concerned) >= _MOST_CONCERNED:
-                self._concerned.clear()
-            known = self._concerned[key] = tuple(
-                one
-                for one in self.subscriptions.values()
-                if one.concerns(entity) and one.may_want(names)
-            )
-        return known
-
-    def forget_concerned(self) -> None:
-        """Clear the cache after a change of the subscriptions."""
-        self._concerned.clear()
-
-    def registration(
-        self, scope: Scope, entity_id: str, kind: str, name: str
-    ) -> Registration | None:
-        """The oldest registration of an attribute of an entity."""
-        wanted = (scope.path, entity_id, kind)
-        for one in self.registrations.values():
-            if name in one.attrs and (
-                wanted == (one.path, one.entity_id, one.entity_type)
-            ):
-                return one
-        return None
 
 
 class ContextBroker:
@@ -123,51 +95,35 @@ class ContextBroker:
 
     def __init__(self) -> None:
         self._tenants: dict[str, Tenant] = {}
-        self.outbox = Outbox(clock.wall)
+        self.outbox = Outbox()
         self.providers: dict[str, Provider] = {}
         self._passing: set[asyncio.Future[None]] = set()
 
     def tenant(self, service: str) -> Tenant:
         """The data of a tenant; empty for an unknown one."""
-        known = self._tenants.get(service)
-        if known is None:
-            known = self._tenants[service] = Tenant()
-        return known
+        return self._tenants.setdefault(service, Tenant())
 
     def close(self) -> None:
         """Close the connections to receivers; forget commands under way."""
         self.outbox.close()
-        for one in self._passing:
-            one.cancel()
+        for passing in self._passing:
+            passing.cancel()
 
     # --- entities ---------------------------------------------------------------
 
     def known(self, scope: Scope, entity_id: str, kind: str) -> Entity | None:
-        """The entity of an id and a type, which may be empty, if there is one.
-
-        Raises:
-            FiwareError: 409 several.
-        """
+        """The oldest entity of an id and a type, which may be empty."""
         entities = self.tenant(scope.service).entities
         if kind:
             return entities.get((scope.path, entity_id, kind))
-        found = [
-            one
-            for one in entities.values()
-            if (one.path, one.id) == (scope.path, entity_id)
-        ]
-        if len(found) > 1:
-            raise FiwareError(
-                "TooManyResults",
-                "More than one matching entity. Please refine your query",
-            )
-        return found[0] if found else None
+        place = (scope.path, entity_id)
+        return next((entities[key] for key in entities if key[:2] == place), None)
 
     def find(self, scope: Scope, entity_id: str, kind: str) -> Entity:
         """Find the entity of an id and a type, which may be empty.
 
         Raises:
-            FiwareError: 404 none, 409 several.
+            FiwareError: 404, there is none.
         """
         found = self.known(scope, entity_id, kind)
         if found is None:
@@ -175,43 +131,26 @@ class ContextBroker:
         return found
 
     def upsert(
-        self,
-        scope: Scope,
-        entity_id: str,
-        kind: str,
-        changes: Mapping[str, EntityChange],
+        self, scope: Scope, entity_id: str, kind: str, changes: Mapping[str, Attribute]
     ) -> None:
         """Create an entity, or add to and change its attributes; notify."""
+        made = Entity(entity_id, kind, scope.path)
         entities = self.tenant(scope.service).entities
-        entity = entities.get((scope.path, entity_id, kind))
-        if entity is None:
-            entity = Entity(entity_id, kind, scope.path, scope.now, scope.now)
-            entities[entity.key] = entity
-        self.append(scope, entity, changes)
+        self.append(scope, entities.setdefault(made.key, made), changes)
 
     def append(
-        self, scope: Scope, entity: Entity, changes: Mapping[str, EntityChange]
+        self, scope: Scope, entity: Entity, changes: Mapping[str, Attribute]
     ) -> None:
         """Change attributes; create the missing ones; notify."""
-        touched = apply(entity, changes, scope.now)
-        for subscription in self.tenant(scope.service).concerned(
-            entity, tuple(touched.now)
-        ):
-            if subscription.wants(touched, scope.now):
-                self.outbox.post(subscription, entity, scope.now)
-
-    def delete(self, scope: Scope, entity: Entity) -> None:
-        """Delete an entity, of which nobody is notified."""
-        del self.tenant(scope.service).entities[entity.key]
+        changed = entity.apply(changes, scope.now)
+        for subscription in self.tenant(scope.service).subscriptions.values():
+            if subscription.wants(entity, changed):
+                self.outbox.post(subscription, entity)
 
     # --- updates that may have to be passed on ----------------------------------
 
     async def update(
-        self,
-        scope: Scope,
-        entity_id: str,
-        kind: str,
-        changes: Mapping[str, EntityChange],
+        self, scope: Scope, entity_id: str, kind: str, changes: Mapping[str, Attribute]
     ) -> None:
         """Change existing attributes; pass registered ones on to their providers.
 
@@ -228,22 +167,20 @@ class ContextBroker:
         if entity is not None and local:
             self.append(scope, entity, local)
         missing = []
-        for name, change in changes.items():
-            if name not in local:
-                registration = self.tenant(scope.service).registration(
-                    scope, entity_id, kind, name
-                )
-                if registration is None:
-                    missing.append(name)
-                else:
-                    await self._pass_on(registration, scope, {name: change.value})
+        for name in changes.keys() - local.keys():
+            for registration in self.tenant(scope.service).registrations.values():
+                if registration.provides(scope.path, entity_id, kind, name):
+                    await self._pass_on(
+                        registration, scope, {name: changes[name].value}
+                    )
+                    break
+            else:
+                missing.append(name)
         if missing and entity is None:
             raise not_found()
         if missing:
-            raise FiwareError(
-                "PartialUpdate" if local else "Unprocessable",
-                f"do not exist: {entity_id} - [ {', '.join(missing)} ]",
-            )
+            sentence = f"do not exist: {entity_id} - [ {', '.join(missing)} ]"
+            raise FiwareError("Unprocessable", sentence)
 
     async def _pass_on(
         self, registration: Registration, scope: Scope, values: Mapping[str, object]
@@ -256,32 +193,13 @@ class ContextBroker:
         provider = self.providers.get(registration.url)
         if provider is None:
             raise not_found()
-        about = registration.entity_id, registration.entity_type
-        passing = asyncio.ensure_future(provider(scope, *about, values))
+        entity = registration.entity_id, registration.entity_type
+        passing = asyncio.ensure_future(provider(scope, *entity, values))
         self._passing.add(passing)
         passing.add_done_callback(self._passing.discard)
         done, _ = await asyncio.wait({passing}, timeout=PATIENCE_S)
-        if not done:
+        if not done or passing.exception() is not None:
             raise not_found()
-        try:
-            passing.result()
-        except FiwareError:
-            raise not_found() from None
-
-    # --- subscriptions ----------------------------------------------------------
-
-    def subscribe(self, subscription: Subscription) -> None:
-        """Store a subscription; it is notified of later changes."""
-        tenant = self.tenant(subscription.service)
-        tenant.subscriptions[subscription.id] = subscription
-        tenant.forget_concerned()
-
-    def unsubscribe(self, subscription: Subscription) -> None:
-        """Delete a subscription and close its connection."""
-        tenant = self.tenant(subscription.service)
-        del tenant.subscriptions[subscription.id]
-        tenant.forget_concerned()
-        self.outbox.forget(subscription.id)
 
 
 _OPTIONS = {"keyValues", "count", "upsert", "skipForwarding"}
@@ -293,65 +211,67 @@ _SERVICE = re.compile(r"[a-z0-9_]{0,50}")
 _PATH = re.compile(r"/|(/[A-Za-z0-9_]{1,50}){1,10}")
 
 
-@dataclass(frozen=True, slots=True)
 class _Call:
-    """One request.
+    """One request, with what came with it.
 
-    Attributes:
-        body: What came with it.
-        options: ``?options=``.
+    Raises:
+        FiwareError: 400, 413 or 501.
     """
 
-    request: Request
-    body: bytes
-    broker: ContextBroker
-    scope: Scope
-    options: frozenset[str]
+    def __init__(self, request: Request, body: bytes, broker: ContextBroker) -> None:
+        self.query, self.body, self.broker = request.query_params, body, broker
+        self.place = request.path_params
+        self.name = str(self.place.get("id", ""))
+        self.kind = self.query.get("type", "")
+        self.options = set(_split(self.query.get("options")))
+        if len(body) > _MAX_BODY:
+            raise FiwareError(
+                "RequestEntityTooLarge",
+                f"payload size: {len(body)}, max size supported: {_MAX_BODY}",
+            )
+        unknown = (self.options - _OPTIONS) | (self.query.keys() - _PARAMETERS)
+        if unknown:
+            raise not_supported(f"parameter or option {min(unknown)}")
+        service = request.headers.get("fiware-service", "").lower()
+        if _SERVICE.fullmatch(service) is None:
+            raise bad_request(
+                "bad character in tenant name - only underscore and alphanumeric "
+                "characters are allowed"
+            )
+        path = request.headers.get("fiware-servicepath", "/")
+        if _PATH.fullmatch(path) is None:
+            raise bad_request("Bad Character in Service-Path")
+        self.scope = Scope(service, path, clock.wall())
+        self.tenant = broker.tenant(service)
 
-    @property
-    def name(self) -> str:
-        """Id of the entity, subscription or registration in the path."""
-        return str(self.request.path_params["id"])
-
-    @property
-    def kind(self) -> str:
-        """``?type=``."""
-        return self.request.query_params.get("type", "")
-
-    @property
-    def tenant(self) -> Tenant:
-        """The data of its tenant."""
-        return self.broker.tenant(self.scope.service)
-
-    def read_object(self) -> dict[str, object]:
-        """The body, which must be an object.
-
-        Raises:
-            FiwareError: 400.
-        """
-        return load_object(self.body)
-
-    def changes(self, raw: Mapping[str, object]) -> dict[str, EntityChange]:
+    def changes(self, raw: Mapping[str, Any]) -> dict[str, Attribute]:
         """Read attributes of the body.
 
         Raises:
             FiwareError: 400 or 501.
         """
         clean = looks_clean(self.body)
-        return {
-            check_name(name, "attribute name"): _read_change(one, clean=clean)
-            for name, one in raw.items()
-        }
+        changes = {}
+        for name, attribute in raw.items():
+            check_name(name, "attribute name")
+            if not isinstance(attribute, dict):
+                raise bad_request("attribute must be a JSON object")
+            if attribute.keys() != {"type", "value"}:
+                raise not_supported("an attribute but with its type and value")
+            kind = check_name(attribute["type"], "attribute type")
+            check_value(attribute["value"], clean=clean)
+            changes[name] = Attribute(kind, attribute["value"])
+        return changes
 
     def view(self) -> EntityView:
         """The requested representation."""
-        dated = self.request.query_params.get("metadata", "")
+        dated = self.query.get("metadata", "")
         if dated not in ("", "dateModified"):
             raise not_supported("metadata other than dateModified")
-        names = _split(self.request.query_params.get("attrs"))
+        names = _split(self.query.get("attrs"))
         return EntityView(names, "keyValues" in self.options, bool(dated))
 
-    def page(self, shown: list[bytes]) -> Response:
+    def page(self, shown: Iterable[bytes]) -> Response:
         """The requested part of a list of JSON texts.
 
         Raises:
@@ -360,30 +280,18 @@ class _Call:
         limit, offset = self._number("limit", "20"), self._number("offset", "0")
         if limit > 1000:
             raise bad_request(f"Bad pagination limit: /{limit}/ [max: 1000]")
-        body = b"[%b]" % b",".join(shown[offset : offset + limit])
-        counted = {"Fiware-Total-Count": str(len(shown))}
-        return _json(body, headers=counted if "count" in self.options else None)
+        texts = list(shown)
+        body = b"[%b]" % b",".join(texts[offset : offset + limit])
+        return _json(body, {"Fiware-Total-Count": str(len(texts))})
 
     def _number(self, name: str, default: str) -> int:
-        text = self.request.query_params.get(name, default)
+        text = self.query.get(name, default)
         if not text.isdecimal():
             raise bad_request(f"Bad pagination {name}: /{text}/")
         return int(text)
 
 
 _Answer = Callable[[_Call], Awaitable[Response]]
-
-
-def _read_change(raw: object, *, clean: bool) -> EntityChange:
-    if not isinstance(raw, dict):
-        raise bad_request("attribute must be a JSON object")
-    if not raw.keys() <= {"type", "value"}:
-        raise not_supported("more of an attribute than its type and value")
-    kind, value = raw.get("type"), raw.get("value")
-    if kind is not None:
-        check_name(kind, "attribute type")
-    check_value(value, clean=clean)
-    return EntityChange(kind, value)
 
 
 def _split(text: str | None) -> tuple[str, ...]:
@@ -396,95 +304,54 @@ def ngsi_api(broker: ContextBroker) -> Starlette:
 
     def endpoint(answer: _Answer) -> Endpoint:
         async def respond(request: Request) -> Response:
-            return await answer(await _read(request, broker))
+            return await answer(_Call(request, await request.body(), broker))
 
         return respond
 
     table = {line: endpoint(answer) for line, answer in _ANSWERS.items()}
-    return fiware_app(table, _refusal)
+    return fiware_app(table, "error", "description")
 
 
-def _refusal(error: FiwareError) -> Response:
-    return _json(error.body("error", "description"), error.status)
-
-
-def _json(
-    body: bytes, status: int = 200, headers: Mapping[str, str] | None = None
-) -> Response:
-    return Response(body, status, headers, "application/json")
-
-
-async def _read(request: Request, broker: ContextBroker) -> _Call:
-    """A request with its body, tenant, path and options.
-
-    Raises:
-        FiwareError: 400, 413 or 501.
-    """
-    body = await request.body()
-    if len(body) > _MAX_BODY:
-        raise FiwareError(
-            "RequestEntityTooLarge",
-            f"payload size: {len(body)}, max size supported: {_MAX_BODY}",
-        )
-    options = frozenset(_split(request.query_params.get("options")))
-    for name in sorted(options - _OPTIONS):
-        raise not_supported(f"options={name}")
-    for name in sorted(request.query_params.keys() - _PARAMETERS):
-        raise not_supported(f"parameter {name}")
-    return _Call(request, body, broker, _read_scope(request), options)
-
-
-def _read_scope(request: Request) -> Scope:
-    service = request.headers.get("fiware-service", "").lower()
-    if _SERVICE.fullmatch(service) is None:
-        raise bad_request(
-            "bad character in tenant name - only underscore and alphanumeric "
-            "characters are allowed"
-        )
-    path = request.headers.get("fiware-servicepath", "/")
-    if _PATH.fullmatch(path) is None:
-        raise bad_request("Bad Character in Service-Path")
-    return Scope(service, path, clock.wall())
+def _json(body: bytes, headers: Mapping[str, str] | None = None) -> Response:
+    return Response(body, 200, headers, "application/json")
 
 
 async def _version(_: _Call) -> Response:
-    about = {"version": "4.7.0-iveg-embedded"}
-    return _json(orjson.dumps({"orion": about}))
+    return _json(b'{"orion":{"version":"4.7.0-iveg-embedded"}}')
 
 
 # --- entities -------------------------------------------------------------------
 
 
 async def _create_entity(call: _Call) -> Response:
-    raw = call.read_object()
+    raw = load_object(call.body)
     entity_id = check_name(raw.pop("id", ""), "entity id")
-    kind = check_name(raw.pop("type", "Thing"), "entity type")
+    kind = check_name(raw.pop("type", ""), "entity type")
     changes = call.changes(raw)
-    known = (call.scope.path, entity_id, kind) in call.tenant.entities
-    if known and "upsert" not in call.options:
+    is_known = (call.scope.path, entity_id, kind) in call.tenant.entities
+    if is_known and "upsert" not in call.options:
         raise FiwareError("Unprocessable", "Already Exists")
     call.broker.upsert(call.scope, entity_id, kind, changes)
     location = {"Location": f"/v2/entities/{entity_id}?type={kind}"}
-    return Response(status_code=204 if known else 201, headers=location)
+    return Response(status_code=204 if is_known else 201, headers=location)
 
 
 async def _list_entities(call: _Call) -> Response:
-    """An entity without a requested attribute is listed without it."""
-    query = call.request.query_params
-    ids, kinds, order = _split(query.get("id")), _split(call.kind), query.get("orderBy")
-    if order not in (None, "id"):
+    """List entities; one without a requested attribute is listed without it."""
+    ids, kinds = _split(call.query.get("id")), _split(call.kind)
+    if call.query.get("orderBy", "id") != "id":
         raise not_supported("orderBy other than id")
     found = [
-        one
-        for one in call.tenant.entities.values()
-        if one.path == call.scope.path
-        and (not ids or one.id in ids)
-        and (not kinds or one.type in kinds)
+        entity
+        for entity in call.tenant.entities.values()
+        if entity.path == call.scope.path
+        and (not ids or entity.id in ids)
+        and (not kinds or entity.type in kinds)
     ]
-    if order:
-        found.sort(key=lambda one: one.id)
     view = call.view()
-    return call.page([write_entity(one, view) for one in found])
+    if "orderBy" in call.query:
+        found.sort(key=lambda entity: entity.id)
+    return call.page(write_entity(entity, view) for entity in found)
 
 
 async def _get_entity(call: _Call) -> Response:
@@ -493,21 +360,22 @@ async def _get_entity(call: _Call) -> Response:
 
 
 async def _delete_entity(call: _Call) -> Response:
+    """Delete an entity; nobody is notified."""
     entity = call.broker.find(call.scope, call.name, call.kind)
-    call.broker.delete(call.scope, entity)
+    del call.tenant.entities[entity.key]
     return Response(status_code=204)
 
 
 async def _update_attributes(call: _Call) -> Response:
-    changes = call.changes(call.read_object())
+    changes = call.changes(load_object(call.body))
     await call.broker.update(call.scope, call.name, call.kind, changes)
     return Response(status_code=204)
 
 
 async def _delete_attribute(call: _Call) -> Response:
-    """Nobody is notified."""
+    """Delete an attribute; nobody is notified."""
     entity = call.broker.find(call.scope, call.name, call.kind)
-    if entity.attributes.pop(call.request.path_params["name"], None) is None:
+    if entity.attributes.pop(call.place["name"], None) is None:
         raise not_found("The entity does not have such an attribute")
     return Response(status_code=204)
 
@@ -517,25 +385,26 @@ async def _delete_attribute(call: _Call) -> Response:
 
 async def _list_subscriptions(call: _Call) -> Response:
     known = call.tenant.subscriptions.values()
-    return call.page(_printed(one.show(call.scope.now) for one in known))
+    return call.page(orjson.dumps(subscription.show()) for subscription in known)
 
 
 async def _create_subscription(call: _Call) -> Response:
-    made = read_subscription(call.read_object(), call.scope.service, call.scope.path)
-    call.broker.subscribe(made)
-    return Response(
-        status_code=201, headers={"Location": f"/v2/subscriptions/{made.id}"}
-    )
+    scope, raw = call.scope, load_object(call.body)
+    made = Subscription(new_id(), raw, scope.service, scope.path)
+    call.tenant.subscriptions[made.id] = made
+    location = {"Location": f"/v2/subscriptions/{made.id}"}
+    return Response(status_code=201, headers=location)
 
 
 async def _change_subscription(call: _Call) -> Response:
-    _subscription(call).change(call.read_object())
-    call.tenant.forget_concerned()
+    _subscription(call).change(load_object(call.body))
     return Response(status_code=204)
 
 
 async def _delete_subscription(call: _Call) -> Response:
-    call.broker.unsubscribe(_subscription(call))
+    subscription_id = _subscription(call).id
+    del call.tenant.subscriptions[subscription_id]
+    call.broker.outbox.forget(subscription_id)
     return Response(status_code=204)
 
 
@@ -548,17 +417,13 @@ def _subscription(call: _Call) -> Subscription:
 
 async def _list_registrations(call: _Call) -> Response:
     known = call.tenant.registrations.values()
-    return call.page(_printed(one.show() for one in known))
+    return call.page(orjson.dumps(registration.show()) for registration in known)
 
 
 async def _delete_registration(call: _Call) -> Response:
     if call.tenant.registrations.pop(call.name, None) is None:
         raise not_found("The requested registration has not been found. Check id")
     return Response(status_code=204)
-
-
-def _printed(shown: Iterable[dict[str, object]]) -> list[bytes]:
-    return [orjson.dumps(one) for one in shown]
 
 
 _ANSWERS: dict[str, _Answer] = {

@@ -8,41 +8,144 @@ invalid ``TimeInstant``.
 """
 
 import logging
-from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from typing import Any, NamedTuple, TypeVar
 
 import orjson
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import Response
 
 from iveg.adapters import clock
 from iveg.lab.embedded.context_broker import ContextBroker, Registration
-from iveg.lab.embedded.devices import (
-    AgentDevice,
-    Group,
-    Registry,
-    Tenancy,
-    read_device,
-    read_group,
-)
 from iveg.lab.embedded.entities import (
-    EntityChange,
+    Attribute,
     FiwareError,
     Scope,
-    Value,
     bad_request,
     check_name,
     check_value,
-    date_json,
-    date_text,
     fiware_app,
     load_object,
     looks_clean,
     new_id,
-    wrong_syntax,
+    not_supported,
+    read_date,
+    write_date,
 )
 from iveg.lab.embedded.mqtt_broker import MqttBroker
+
+# --- groups and devices -----------------------------------------------------------
+
+_Read = TypeVar("_Read", bound="_Provisioned")
+_NotDone = list[object]
+
+
+def _wrong_syntax() -> FiwareError:
+    return FiwareError(
+        "WRONG_SYNTAX", "Wrong syntax in request: Errors found validating request."
+    )
+
+
+class Tenancy(NamedTuple):
+    """Service and subservice that a request is about."""
+
+    service: str
+    subservice: str
+
+
+class DeviceAttribute(BaseModel):
+    """An attribute: its name at the device and at the context broker."""
+
+    object_id: str | None = None
+    name: str
+    type: str = "Text"
+
+
+class DeviceCommand(BaseModel):
+    """A command."""
+
+    name: str
+    type: str = "command"
+
+
+class _Provisioned(BaseModel):
+    """Fields of groups and devices alike; other fields are taken and ignored."""
+
+    model_config = ConfigDict(frozen=True)
+
+    apikey: str
+    service: str
+    entity_type: str
+    attributes: list[DeviceAttribute] = []
+    lazy: _NotDone = Field([], max_length=0)
+    commands: list[DeviceCommand] = []
+    static_attributes: _NotDone = Field([], max_length=0)
+
+
+class Group(_Provisioned):
+    """Common settings of the devices with one API key, as clients keep them here."""
+
+    subservice: str
+    resource: str
+    autoprovision: bool | None = None
+
+
+class AgentDevice(_Provisioned):
+    """One device.
+
+    Attributes:
+        registration_id: Its registration at the context broker; empty for none.
+    """
+
+    device_id: str
+    service_path: str
+    entity_name: str
+    entity_type: str = "Thing"
+    transport: str = "MQTT"
+    protocol: str | None = None
+    registration_id: str = Field("", exclude=True)
+
+    @property
+    def place(self) -> str:
+        """Beginning of its topics."""
+        return f"/{self.apikey}/{self.device_id}"
+
+    @cached_property
+    def mapping(self) -> Mapping[str, tuple[str, str]]:
+        """Attribute name of the device → its NGSI name and type."""
+        return {
+            attribute.object_id or attribute.name: (attribute.name, attribute.type)
+            for attribute in self.attributes
+        }
+
+    @cached_property
+    def command_names(self) -> frozenset[str]:
+        """Names of its commands."""
+        return frozenset(command.name for command in self.commands)
+
+    def show(self) -> dict[str, Any]:
+        """The device as the agent shows it: with a name of each command at it."""
+        commands = [
+            {**command.model_dump(), "object_id": command.name}
+            for command in self.commands
+        ]
+        return {**self.model_dump(exclude_none=True), "commands": commands}
+
+
+def _read(kind: type[_Read], raw: Mapping[str, Any]) -> _Read:
+    try:
+        return kind.model_validate(raw)
+    except ValidationError as error:
+        for fault in error.errors():
+            if fault["type"] == "too_long":
+                raise not_supported(str(fault["loc"][0])) from error
+        raise _wrong_syntax() from error
+
+
+# --- messages of devices ----------------------------------------------------------
 
 MAX_MEASURE = (1 << 20) - 256
 _INSTANT = "TimeInstant"
@@ -51,7 +154,7 @@ _RENAMED = {"id": "measure_id", "type": "measure_type"}
 
 def read_measure(
     device: AgentDevice, payload: bytes, now: float
-) -> dict[str, EntityChange]:
+) -> dict[str, Attribute]:
     """Read the payload of an ``attrs`` topic.
 
     Raises:
@@ -62,84 +165,66 @@ def read_measure(
         raise bad_request(f"payload size: {len(payload)}")
     clean = looks_clean(payload)
     given = measure.pop(_INSTANT, None)
-    instant = date_json(now) if given is None else date_text(given)
+    instant = write_date(now) if given is None else read_date(given)
     changes = {}
-    mapping = device.mapping
     for key, value in measure.items():
-        name, kind = mapping.get(key) or (_RENAMED.get(key, key), "Text")
+        name, kind = device.mapping.get(key) or (_RENAMED.get(key, key), "Text")
         check_name(name, "attribute name")
         check_value(value, clean=clean)
-        changes[name] = EntityChange(kind, value, instant)
-    changes[_INSTANT] = EntityChange("DateTime", Value(json=instant))
+        changes[name] = Attribute(kind, value, instant)
+    changes[_INSTANT] = Attribute("DateTime", instant)
     return changes
 
 
 def read_answer(
     device: AgentDevice, payload: bytes, now: float
-) -> dict[str, EntityChange]:
+) -> dict[str, Attribute]:
     """Read the payload of a ``cmdexe`` topic; answers to unknown commands are left.
 
     Raises:
         FiwareError: 400, it is discarded.
     """
     answers = load_object(payload)
-    return status_changes(
-        {name: ("OK", answers[name]) for name in device.command_names & answers.keys()},
-        now,
-    )
-
-
-def status_changes(
-    results: Mapping[str, tuple[str, object]], now: float
-) -> dict[str, EntityChange]:
-    """Changes that the agent writes for the status of commands.
-
-    Args:
-        results: Command → status, and the answer (for a status of ``OK``).
-        now: Seconds, Unix time.
-
-    Raises:
-        FiwareError: 400, a forbidden character in an answer.
-    """
-    if not results:
-        return {}
-    instant = date_json(now)
-    changes = {}
-    for name, (status, answer) in results.items():
-        changes[f"{name}_status"] = EntityChange("commandStatus", status, instant)
-        if status == "OK":
-            check_value(answer, clean=False)
-            changes[f"{name}_info"] = EntityChange("commandResult", answer, instant)
-    changes[_INSTANT] = EntityChange("DateTime", Value(json=instant))
+    changes: dict[str, Attribute] = {}
+    for name in device.command_names & answers.keys():
+        check_value(answers[name], clean=False)
+        instant = write_date(now)
+        changes |= _status_change(name, "OK", now)
+        changes[f"{name}_info"] = Attribute("commandResult", answers[name], instant)
     return changes
+
+
+def _status_change(name: str, status: str, now: float) -> dict[str, Attribute]:
+    """Changes that the agent writes for the status of a command."""
+    instant = write_date(now)
+    return {
+        f"{name}_status": Attribute("commandStatus", status, instant),
+        _INSTANT: Attribute("DateTime", instant),
+    }
 
 
 _log = logging.getLogger(__name__)
 _READERS = {"attrs": read_measure, "cmdexe": read_answer}
-_Topic = tuple[str, str, str]
-"""API key, device, ``attrs`` or ``cmdexe``."""
-
-
-@lru_cache(maxsize=2048)
-def _read_device_topic(topic: str) -> _Topic | None:
-    match topic.split("/"):
-        case ["", apikey, device, kind] if kind in _READERS:
-            return apikey, device, kind
-    return None
 
 
 class IotAgent:
-    """Devices with their measures and commands.
+    """Groups and devices of every tenant, with their measures and commands.
 
     Args:
         broker: The context broker.
         mqtt: The MQTT broker that devices use.
+
+    Attributes:
+        groups: By tenancy, resource and API key, oldest first.
+        devices: By tenancy, API key and id, oldest first.
     """
 
     def __init__(self, broker: ContextBroker, mqtt: MqttBroker) -> None:
         self._broker = broker
         self._mqtt = mqtt
-        self.registry = Registry()
+        self.groups: dict[tuple[Tenancy, str, str], Group] = {}
+        self.devices: dict[tuple[Tenancy, str, str], AgentDevice] = {}
+        self._by_place: dict[str, AgentDevice] = {}
         self._url = ""
         mqtt.listen(self.hear)
 
@@ -148,84 +233,81 @@ class IotAgent:
         self._url = url
         self._broker.providers[url] = self.command
 
+    def north_port(self) -> Starlette:
+        """Its HTTP side."""
+        return iota_api(self)
+
     # --- measures ---------------------------------------------------------------
 
     def hear(self, topic: str, payload: bytes) -> None:
-        """Handle an MQTT message, if it is for the agent.
+        """Handle an MQTT message, if it is of a device that is provisioned.
 
         Topics are ``/{apikey}/{device}/attrs`` and ``…/cmdexe``.
         """
-        spoken = _read_device_topic(topic)
-        if spoken is None:
+        place, _, kind = topic.rpartition("/")
+        device = self._by_place.get(place)
+        if device is None or kind not in _READERS:
             return
+        now = clock.wall()
         try:
-            self._take_from(spoken, payload, clock.wall())
+            self._write(device, _READERS[kind](device, payload, now), now)
         except FiwareError as error:
             # Devices get no error.
             _log.debug("a message on %s was discarded: %s", topic, error)
 
-    def _take_from(self, spoken: _Topic, payload: bytes, now: float) -> None:
-        apikey, device_id, kind = spoken
-        device = self.registry.device_of(apikey, device_id)
-        if device is None:
-            device = self._autoprovision(apikey, device_id)
-        if device is not None:
-            self._write(device, _READERS[kind](device, payload, now), now)
-
     def _write(
-        self, device: AgentDevice, changes: Mapping[str, EntityChange], now: float
+        self, device: AgentDevice, changes: Mapping[str, Attribute], now: float
     ) -> None:
         if changes:
             scope = Scope(device.service, device.service_path, now)
             self._broker.upsert(scope, device.entity_name, device.entity_type, changes)
 
-    def _autoprovision(self, apikey: str, device_id: str) -> AgentDevice | None:
-        group = self.registry.group_of(apikey)
-        if group is None or group.autoprovision is False:
-            return None
-        return self._keep(read_device({"device_id": device_id}, group.tenancy, group))
-
     # --- devices ----------------------------------------------------------------
 
-    def provision(self, raw: Mapping[str, object], tenancy: Tenancy) -> None:
-        """Create one device from a ``POST``.
+    def provision(self, raw: Mapping[str, Any], tenancy: Tenancy) -> None:
+        """Create one device from a ``POST``, and register its commands.
 
         Raises:
             FiwareError: 400 or 501, or 409 if the device exists.
         """
-        group = self.registry.group_of(raw.get("apikey"), tenancy)
-        device = read_device(raw, tenancy, group)
-        if self.registry.is_known(device):
+        if "device_id" not in raw:
+            raise FiwareError(
+                "MISSING_ATTRIBUTES",
+                "The request was not well formed:"
+                'Missing attributes: ["device_id"] with: the device',
+            )
+        service, path = tenancy
+        made = {"service": service, "service_path": path, "registration_id": new_id()}
+        device = _read(AgentDevice, {**raw, **made})
+        key = tenancy, device.apikey, device.device_id
+        if key in self.devices:
             raise FiwareError(
                 "DUPLICATE_DEVICE_ID",
                 "A device with the same info (DeviceId, ApiKey, Service, Subservice) "
                 f"was found:{device.device_id}",
             )
-        self._keep(device)
-
-    def _keep(self, device: AgentDevice) -> AgentDevice:
         if device.commands:
-            device = self._register(device)
-        self.registry.put(device)
-        return device
+            names = tuple(command.name for command in device.commands)
+            entity = device.entity_name, device.entity_type
+            self._registrations(device)[device.registration_id] = Registration(
+                device.registration_id, path, *entity, names, self._url
+            )
+        self.devices[key] = self._by_place[device.place] = device
 
-    def _register(self, device: AgentDevice) -> AgentDevice:
-        """Register the commands of an entity at the context broker."""
-        made = Registration(
-            new_id(),
-            device.service_path,
-            device.entity_name,
-            device.entity_type,
-            tuple(one.name for one in device.commands),
-            self._url,
-        )
-        self._registrations(device)[made.id] = made
-        return device.model_copy(update={"registration_id": made.id})
+    def forget(self, tenancy: Tenancy, device_id: str) -> None:
+        """Delete a device and its registration.
 
-    def forget(self, device: AgentDevice) -> None:
-        """Delete a device and its registration."""
+        Raises:
+            FiwareError: 404.
+        """
+        for key, device in self.devices.items():
+            if key[0] == tenancy and device.device_id == device_id:
+                break
+        else:
+            raise _no_device(device_id)
         self._registrations(device).pop(device.registration_id, None)
-        self.registry.remove(device)
+        del self.devices[key]
+        self._by_place.pop(device.place, None)
 
     def _registrations(self, device: AgentDevice) -> dict[str, Registration]:
         return self._broker.tenant(device.service).registrations
@@ -237,150 +319,168 @@ class IotAgent:
     ) -> None:
         """Publish commands of one entity.
 
-        An unknown command is ignored, and one without a connected robot is lost:
-        neither is an error.
+        Several devices may share the entity.  MongoDB answers in the order of its
+        index: the command goes to the one whose API key and id sort first, and is
+        ignored where that has none of this name.  A command without a connected robot
+        is lost.
 
         Raises:
             FiwareError: 404, no device has this entity.
         """
-        device = self.registry.device_for(
-            Tenancy(scope.service, scope.path), name, kind
-        )
-        now = clock.wall()
-        known = {one: values[one] for one in values if one in device.command_names}
-        for command, value in known.items():
-            topic = f"/{device.apikey}/{device.device_id}/cmd"
-            self._mqtt.publish(topic, orjson.dumps({command: value}))
-        pending = dict.fromkeys(known, ("PENDING", None))
-        self._write(device, status_changes(pending, now), now)
+        found = [
+            device
+            for key, device in sorted(self.devices.items(), key=lambda item: item[0])
+            if key[0] == (scope.service, scope.path)
+            and (device.entity_name, device.entity_type) == (name, kind)
+        ]
+        if not found:
+            raise _no_device(name)
+        device, now = found[0], clock.wall()
+        for command in device.command_names & values.keys():
+            self._mqtt.publish(
+                f"{device.place}/cmd", orjson.dumps({command: values[command]})
+            )
+            self._write(device, _status_change(command, "PENDING", now), now)
 
+
+def _no_device(name: str) -> FiwareError:
+    return FiwareError("DEVICE_NOT_FOUND", f"No device was found with id:{name}")
+
+
+# --- north port -------------------------------------------------------------------
 
 _ABOUT = {
     "libVersion": "4.14.0-iveg-embedded",
     "baseRoot": "/",
     "version": "3.14.0-iveg-embedded",
 }
-_JSON = "application/json; charset=utf-8"
 
 
 def iota_api(agent: IotAgent) -> Starlette:
     """The north port of an agent, which answers requests as the real one does."""
-    devices, groups = _DeviceApi(agent), _GroupApi(agent.registry)
+    api = _NorthPort(agent)
     table = {
-        "GET /iot/about": _about,
-        "GET /iot/services": groups.list,
-        "POST /iot/services": groups.create,
-        "PUT /iot/services": groups.change,
-        "DELETE /iot/services": groups.delete,
-        "GET /iot/devices": devices.list,
-        "POST /iot/devices": devices.create,
-        "DELETE /iot/devices/{id}": devices.delete,
+        "GET /iot/about": api.about,
+        "GET /iot/services": api.list_groups,
+        "POST /iot/services": api.create_groups,
+        "PUT /iot/services": api.change_group,
+        "GET /iot/devices": api.list_devices,
+        "POST /iot/devices": api.create_devices,
+        "DELETE /iot/devices/{id}": api.delete_device,
     }
-    return fiware_app(table, _refusal)
+    return fiware_app(table, "name", "message")
 
 
-async def _about(_: Request) -> Response:
-    return _json(_ABOUT)
-
-
-class _GroupApi:
-    """``/iot/services``."""
-
-    def __init__(self, registry: Registry) -> None:
-        self._registry = registry
-
-    async def list(self, request: Request) -> Response:
-        return _page(request, "services", self._registry.groups(_tenancy(request)))
-
-    async def create(self, request: Request) -> Response:
-        tenancy = _tenancy(request)
-        for raw in await _listed(request, "services"):
-            self._registry.add_group(read_group(raw, tenancy))
-        return _json({}, 201)
-
-    async def change(self, request: Request) -> Response:
-        tenancy, key = _tenancy(request), _group_key(request)
-        self._registry.change_group(tenancy, *key, await _object(request))
-        return Response(status_code=204)
-
-    async def delete(self, request: Request) -> Response:
-        self._registry.remove_group(_tenancy(request), *_group_key(request))
-        return Response(status_code=204)
-
-
-class _DeviceApi:
-    """``/iot/devices``."""
+class _NorthPort:
+    """``/iot/services`` and ``/iot/devices``."""
 
     def __init__(self, agent: IotAgent) -> None:
         self._agent = agent
 
-    async def list(self, request: Request) -> Response:
-        known = self._agent.registry.devices(_tenancy(request))
-        return _page(request, "devices", known)
+    async def about(self, _: Request) -> Response:
+        return _json(_ABOUT)
 
-    async def create(self, request: Request) -> Response:
+    async def list_groups(self, request: Request) -> Response:
+        tenancy = _tenancy(request)
+        groups = [
+            group.model_dump(exclude_none=True)
+            for key, group in self._agent.groups.items()
+            if key[0] == tenancy
+        ]
+        return _page(request, "services", groups)
+
+    async def create_groups(self, request: Request) -> Response:
+        tenancy = _tenancy(request)
+        for raw in await _listed(request, "services"):
+            if not raw.get("entity_type"):
+                raise FiwareError(
+                    "MISSING_CONFIG_PARAMS",
+                    "The following mandatory configuration parameters were missing: "
+                    '["type"]',
+                )
+            group = _read(Group, {**raw, **tenancy._asdict()})
+            key = tenancy, group.resource, group.apikey
+            if key in self._agent.groups:
+                raise FiwareError(
+                    "DUPLICATE_GROUP",
+                    "A device configuration already exists for resource "
+                    f"{group.resource} and API Key {group.apikey}",
+                )
+            self._agent.groups[key] = group
+        return _json({}, 201)
+
+    async def change_group(self, request: Request) -> Response:
+        """Change a group; absent fields stay."""
+        resource, apikey = (
+            request.query_params.get(name, "") for name in ("resource", "apikey")
+        )
+        key = _tenancy(request), resource, apikey
+        raw, group = await _object(request), self._agent.groups.get(key)
+        if group is None:
+            raise FiwareError(
+                "DEVICE_GROUP_NOT_FOUND",
+                "Couldn\t find device group for fields: "
+                '["resource","apikey"] and values: '
+                f'{{"resource":"{resource}","apikey":"{apikey}"}}',
+            )
+        self._agent.groups[key] = _read(Group, {**group.model_dump(), **raw})
+        return Response(status_code=204)
+
+    async def list_devices(self, request: Request) -> Response:
+        tenancy = _tenancy(request)
+        devices = [
+            device.show()
+            for key, device in self._agent.devices.items()
+            if key[0] == tenancy
+        ]
+        return _page(request, "devices", devices)
+
+    async def create_devices(self, request: Request) -> Response:
         tenancy = _tenancy(request)
         for raw in await _listed(request, "devices"):
             self._agent.provision(raw, tenancy)
         return _json({}, 201)
 
-    async def delete(self, request: Request) -> Response:
-        name = request.path_params["id"]
-        self._agent.forget(self._agent.registry.device(_tenancy(request), name))
+    async def delete_device(self, request: Request) -> Response:
+        self._agent.forget(_tenancy(request), request.path_params["id"])
         return Response(status_code=204)
 
 
-def _refusal(error: FiwareError) -> Response:
-    return Response(error.body("name", "message"), error.status, media_type=_JSON)
-
-
 def _tenancy(request: Request) -> Tenancy:
-    missing = [
-        name
-        for name in ("fiware-service", "fiware-servicepath")
-        if not request.headers.get(name)
-    ]
+    names = "fiware-service", "fiware-servicepath"
+    missing = [name for name in names if not request.headers.get(name)]
     if missing:
         raise FiwareError(
             "MISSING_HEADERS",
             "Some headers were missing from the request: "
             + orjson.dumps(missing).decode(),
         )
-    return Tenancy(
-        request.headers["fiware-service"].lower(),
-        request.headers["fiware-servicepath"],
-    )
+    service, path = (request.headers[name] for name in names)
+    return Tenancy(service.lower(), path)
 
 
-async def _object(request: Request) -> dict[str, object]:
+async def _object(request: Request) -> dict[str, Any]:
     try:
         return load_object(await request.body())
     except FiwareError:
-        raise wrong_syntax() from None
+        raise _wrong_syntax() from None
 
 
-async def _listed(request: Request, name: str) -> list[dict[str, object]]:
+async def _listed(request: Request, name: str) -> Iterable[dict[str, Any]]:
     listed = (await _object(request)).get(name)
-    if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
-        raise wrong_syntax()
+    if not isinstance(listed, list) or not all(isinstance(raw, dict) for raw in listed):
+        raise _wrong_syntax()
     return listed
 
 
-def _group_key(request: Request) -> tuple[str, str]:
-    query = request.query_params
-    return query.get("resource", ""), query.get("apikey", "")
-
-
-def _page(
-    request: Request, name: str, listed: Sequence[Group] | Sequence[AgentDevice]
-) -> Response:
+def _page(request: Request, name: str, listed: list[dict[str, Any]]) -> Response:
     query = request.query_params
     limit, offset = query.get("limit", "20"), query.get("offset", "0")
     if not (limit.isdecimal() and offset.isdecimal()):
-        raise wrong_syntax()
-    shown = [one.show() for one in listed[int(offset) : int(offset) + int(limit)]]
+        raise _wrong_syntax()
+    shown = listed[int(offset) : int(offset) + int(limit)]
     return _json({"count": len(listed), name: shown})
 
 
 def _json(value: object, status: int = 200) -> Response:
-    return Response(orjson.dumps(value), status, media_type=_JSON)
+    return Response(orjson.dumps(value), status, media_type="application/json")

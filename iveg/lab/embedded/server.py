@@ -12,12 +12,11 @@ from starlette.types import ASGIApp
 
 from iveg.domain.errors import SettingsError
 from iveg.lab.embedded.context_broker import ContextBroker, ngsi_api
-from iveg.lab.embedded.iot_agent import IotAgent, iota_api
+from iveg.lab.embedded.iot_agent import IotAgent
 from iveg.lab.embedded.mqtt_broker import MqttBroker, mqtt_broker
 
 Address = tuple[str, int]
 MakeAgent = Callable[[ContextBroker, MqttBroker], IotAgent]
-MakeApi = Callable[[IotAgent], ASGIApp]
 _LONGEST_HEAD = 16_384
 _KEPT_S = 60
 _GRACE_S = 1.0
@@ -64,7 +63,6 @@ async def embedded_fiware(
     iota: Address = ("127.0.0.1", 0),
     *,
     make_agent: MakeAgent = IotAgent,
-    make_api: MakeApi = iota_api,
 ) -> AsyncIterator[Running]:
     """Run all three while the block lasts; port 0 takes a free one.
 
@@ -72,8 +70,7 @@ async def embedded_fiware(
         mqtt: Host and port of the MQTT broker.
         orion: Host and port of the context broker.
         iota: Host and port of the agent's north side.
-        make_agent: Gives the agent; ``make_api`` its north port.
-        make_api: See above.
+        make_agent: Gives the agent.
 
     Raises:
         SettingsError: an address that is not loopback.
@@ -91,7 +88,7 @@ async def embedded_fiware(
             http_server(ngsi_api(broker), orion_host, orion[1])
         )
         iota_port = await stack.enter_async_context(
-            http_server(make_api(agent), iota_host, iota[1])
+            http_server(agent.north_port(), iota_host, iota[1])
         )
         agent.is_at(f"http://{iota_host}:{iota_port}")
         yield Running(south.port, orion_port, iota_port, broker, agent)
@@ -161,7 +158,6 @@ async def serve_fiware(
     *,
     notify_ready: Callable[[], None],
     make_agent: MakeAgent = IotAgent,
-    make_api: MakeApi = iota_api,
 ) -> None:
     """Run the embedded FIWARE until cancelled.
 
@@ -170,17 +166,13 @@ async def serve_fiware(
         orion: Host and port of the context broker.
         iota: Host and port of the agent's north side.
         notify_ready: Called once when all three take requests.
-        make_agent: Gives the agent; ``make_api`` its north port.
-        make_api: See above.
+        make_agent: Gives the agent.
 
     Raises:
         SettingsError: an address that is not loopback.
         OSError: a port that is taken.
     """
-    running = embedded_fiware(
-        mqtt, orion, iota, make_agent=make_agent, make_api=make_api
-    )
-    async with running:
+    async with embedded_fiware(mqtt, orion, iota, make_agent=make_agent):
         notify_ready()
         await asyncio.Event().wait()
 

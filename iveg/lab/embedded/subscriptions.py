@@ -1,32 +1,24 @@
 """Subscriptions, and their notifications by HTTP/1.1.
 
-Each entity of a subscription has a lane: a queue and one connection, so that its
-notifications keep their order.  A receiver takes one notification of a connection in a
-turn of its loop: with one connection for ten robots at 30 Hz turns of more than 3 ms
-would be too long, with ten connections turns of up to 33 ms are not.
+Each entity of a subscription has a lane: a queue, a task and one connection, so that
+its notifications keep their order.
 
-Not by httpx: a post costs 1.5 ms of processor time there and 0.1 ms here, and ten
-robots make 900 in a second.
+Not by httpx: a post costs 1.5 ms of processor time there, and ten robots make 900 in a
+second.
 """
 
 import asyncio
 import logging
 import re
-import ssl
-from collections import deque
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Annotated, Literal, cast
+from collections.abc import Mapping, Set
+from typing import Annotated, Any, Literal
 from urllib.parse import urlsplit
 
-import httptools
 from pydantic import (
-    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
-    NonNegativeInt,
+    PositiveInt,
     ValidationError,
     model_validator,
 )
@@ -36,17 +28,11 @@ from iveg.lab.embedded.entities import (
     FORBIDDEN,
     Entity,
     EntityView,
-    Touched,
     bad_request,
-    date_iso,
-    date_text,
-    new_id,
     not_supported,
-    quoted,
     write_entity,
 )
 
-_DEFAULT_TIMEOUT_MS = 5000
 _LEFT_OUT = ("extra_forbidden", "literal_error")
 
 
@@ -56,59 +42,27 @@ class Document(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, alias_generator=to_camel)
 
 
-def _read_description(text: str | None) -> str | None:
-    if not FORBIDDEN.isdisjoint(text or ""):
-        raise bad_request("forbidden characters in description")
-    return text
-
-
-def _read_date(text: str | None) -> str | None:
-    return date_text(text).decode().strip('"') if text else None
-
-
-def _read_url(text: str) -> str:
-    parts = urlsplit(text)
-    if parts.scheme not in ("http", "https") or not parts.hostname:
-        raise bad_request("Invalid URL parsing notification url")
-    return text
-
-
-def _read_headers(headers: dict[str, str]) -> dict[str, str]:
-    if any("${" in value for value in headers.values()):
-        raise not_supported("a macro in a header")
-    return headers
-
-
-def _read_pattern(text: str | None) -> str | None:
-    try:
-        re.compile(text or "")
-    except re.error:
-        raise bad_request("Invalid regex for entity idPattern") from None
-    return text
-
-
 class SubscribedEntity(Document):
     """One entity, or those whose ids match a pattern."""
 
     id: str | None = None
-    id_pattern: Annotated[str | None, AfterValidator(_read_pattern)] = None
+    id_pattern: re.Pattern[str] | None = None
     type: str | None = None
 
     @model_validator(mode="after")
     def _check(self) -> "SubscribedEntity":
-        if self.id is None and self.id_pattern is None:
-            raise bad_request("subject entities element has neither id nor idPattern")
-        if self.id is not None and self.id_pattern is not None:
-            raise bad_request("/entities/ vector item has both /id/ and /idPattern/")
+        if (self.id is None) == (self.id_pattern is None):
+            raise bad_request("an entity needs either id or idPattern")
         return self
 
     def matches(self, entity: Entity) -> bool:
         """Whether an entity is meant."""
         if self.type not in (None, entity.type):
             return False
-        if self.id is not None:
-            return self.id == entity.id
-        return re.search(self.id_pattern or "", entity.id) is not None
+        pattern = self.id_pattern
+        return (
+            pattern.search(entity.id) is not None if pattern else self.id == entity.id
+        )
 
 
 class SubscriptionCondition(Document):
@@ -116,11 +70,6 @@ class SubscriptionCondition(Document):
 
     attrs: tuple[str, ...] = ()
     notify_on_metadata_change: Literal[True] = True
-
-    @cached_property
-    def watched(self) -> frozenset[str]:
-        """Attributes that are watched; empty for all."""
-        return frozenset(self.attrs)
 
 
 class Subject(Document):
@@ -131,21 +80,15 @@ class Subject(Document):
 
 
 class Endpoint(Document):
-    """The receiver of the notifications."""
+    """The receiver of the notifications; Orion's macros in headers are not supported.
 
-    url: Annotated[str, AfterValidator(_read_url)]
-    timeout: NonNegativeInt | None = None
+    Attributes:
+        timeout: Time limit of a response (ms); 5 s where none is given.
+    """
 
-    @property
-    def timeout_s(self) -> float:
-        """Time limit of a response (s)."""
-        return (self.timeout or _DEFAULT_TIMEOUT_MS) / 1000
-
-
-class CustomEndpoint(Endpoint):
-    """A receiver that gets headers of its own."""
-
-    headers: Annotated[dict[str, str], AfterValidator(_read_headers)] | None = None
+    url: str = Field(pattern=r"^https?://[^/?#]")
+    timeout: PositiveInt | None = None
+    headers: dict[str, Annotated[str, Field(pattern=r"^[^$]*$")]] | None = None
 
 
 class Notification(Document):
@@ -155,50 +98,31 @@ class Notification(Document):
     only_changed_attrs: Literal[False] = False
     attrs_format: Literal["normalized", "keyValues"] = "normalized"
     http: Endpoint | None = None
-    http_custom: CustomEndpoint | None = None
+    http_custom: Endpoint | None = None
     covered: Literal[False] = False
 
     @model_validator(mode="after")
     def _check(self) -> "Notification":
-        if self.http is None and self.http_custom is None:
-            raise bad_request(
-                "http, httpCustom, mqtt, mqttCustom, kafka or kafkaCustom is missing"
-            )
+        if (self.http is None) == (self.http_custom is None):
+            raise bad_request("a notification needs either http or httpCustom")
         return self
-
-    @property
-    def endpoint(self) -> Endpoint:
-        """The receiver."""
-        return next(one for one in (self.http, self.http_custom) if one is not None)
-
-    @property
-    def headers(self) -> Mapping[str, str]:
-        """Headers that the receiver asked for."""
-        custom = self.http_custom
-        return (custom.headers if custom else None) or {}
-
-    @cached_property
-    def view(self) -> EntityView:
-        """Representation of an entity in the notification."""
-        return EntityView(self.attrs, self.attrs_format == "keyValues")
 
 
 class SubscriptionDocument(Document):
-    """What a client says of a subscription, with Orion's defaults."""
+    """A subscription as its client states it, with Orion's defaults."""
 
-    description: Annotated[str | None, AfterValidator(_read_description)] = None
+    description: str | None = Field(None, pattern=f"^[^{FORBIDDEN}]*$")
     subject: Subject
     notification: Notification
-    expires: Annotated[str | None, AfterValidator(_read_date)] = None
     status: Literal["active", "inactive"] = "active"
 
 
-def _read(raw: object) -> SubscriptionDocument:
+def _read(raw: Mapping[str, Any]) -> SubscriptionDocument:
     try:
         return SubscriptionDocument.model_validate(raw)
     except ValidationError as error:
         complaints = error.errors()
-        left_out = [one for one in complaints if one["type"] in _LEFT_OUT]
+        left_out = [fault for fault in complaints if fault["type"] in _LEFT_OUT]
         first = (left_out or complaints)[0]
         place = "/".join(map(str, first["loc"]))
         if left_out:
@@ -206,122 +130,78 @@ def _read(raw: object) -> SubscriptionDocument:
         raise bad_request(f"{place}: {first['msg']}") from error
 
 
-@dataclass(slots=True)
 class Subscription:
-    """One subscription and its counters.
+    """One subscription, and how its notifications fared.
 
-    Attributes:
-        document: The client's request, merged with its later changes.
+    Args:
+        raw: The document of a ``POST``.
         path: Service path of its entities.
         service: Tenant, as in the notification's header.
+
+    Attributes:
+        sent: Number of its notifications.
+        fails: Notifications without a response since the last one with any.
+        failure: Reason of the last, in libcurl's words; empty for none.
+
+    Raises:
+        FiwareError: 400 or 501.
     """
 
-    id: str
-    document: SubscriptionDocument
-    path: str
-    service: str
-    times_sent: int = 0
-    last_notification: float | None = None
-    last_success: float | None = None
-    last_success_code: int = 0
-    last_failure: float | None = None
-    last_failure_reason: str = ""
-    fails: int = 0
+    def __init__(
+        self, subscription_id: str, raw: Mapping[str, Any], service: str, path: str
+    ) -> None:
+        self.id = subscription_id
+        self.document = _read(raw)
+        self.service, self.path = service, path
+        self.sent, self.fails, self.failure = 0, 0, ""
+        self._raw = raw
 
-    def concerns(self, entity: Entity) -> bool:
-        """Whether an entity is subscribed to."""
-        return self.path == entity.path and any(
-            one.matches(entity) for one in self.document.subject.entities
+    def wants(self, entity: Entity, changed: Set[str]) -> bool:
+        """Whether a change of these attributes is to be notified."""
+        subject = self.document.subject
+        return (
+            not changed.isdisjoint(subject.condition.attrs or changed)
+            and self.document.status == "active"
+            and self.path == entity.path
+            and any(subscribed.matches(entity) for subscribed in subject.entities)
         )
 
-    def may_want(self, names: Collection[str]) -> bool:
-        """Whether an update of these attributes can lead to a notification."""
-        watched = self.document.subject.condition.watched
-        return not watched or not watched.isdisjoint(names)
-
-    def status(self, now: float) -> str:
-        """``active``, ``inactive`` or ``expired``."""
-        expires = self.document.expires
-        if expires is not None and expires <= date_iso(now):
-            return "expired"
-        return self.document.status
-
-    def wants(self, touched: Touched, now: float) -> bool:
-        """Whether a change is to be notified now."""
-        if self.status(now) != "active":
-            return False
-        watched = self.document.subject.condition.watched
-        return any(touched.has_changed(name) for name in watched or touched.now)
-
-    def change(self, raw: Mapping[str, object]) -> None:
+    def change(self, raw: Mapping[str, Any]) -> None:
         """Apply a ``PATCH``; each part in it replaces the old one completely.
 
         Raises:
             FiwareError: 400 or 501.
         """
-        kept = self.document.model_dump(by_alias=True, exclude_unset=True)
-        self.document = _read({**kept, **raw})
+        merged = {**self._raw, **raw}
+        self.document, self._raw = _read(merged), merged
         if "status" in raw:
             self.fails = 0
 
-    def sent(self, now: float) -> None:
-        """Count a notification that was sent."""
-        self.times_sent += 1
-        self.last_notification = now
+    def ended(self, failure: str = "") -> None:
+        """Record the end of a notification; any response counts as success."""
+        self.fails = self.fails + 1 if failure else 0
+        self.failure = failure or self.failure
 
-    def succeeded(self, now: float, status: int) -> None:
-        """Record a response of the receiver; any status counts as success."""
-        self.last_success, self.last_success_code, self.fails = now, status, 0
-
-    def failed(self, now: float, reason: str) -> None:
-        """Record a missing response."""
-        self.last_failure, self.last_failure_reason = now, reason
-        self.fails += 1
-
-    def show(self, now: float) -> dict[str, object]:
+    def show(self) -> dict[str, Any]:
         """The subscription as a client gets it."""
-        shown = self.document.model_dump(by_alias=True, exclude_none=True)
-        notification = shown["notification"] | self._counters()
-        told = {"notification": notification, "status": self.status(now)}
-        return {"id": self.id, **shown, **told}
-
-    def _counters(self) -> dict[str, object]:
-        """What became of the notifications; nothing is said of what never was."""
+        shown = self.document.model_dump(mode="json", by_alias=True, exclude_none=True)
         counters = {
-            "timesSent": self.times_sent,
-            "lastNotification": _whole_seconds(self.last_notification),
-            "lastSuccess": _whole_seconds(self.last_success),
-            "lastSuccessCode": self.last_success_code,
-            "lastFailure": _whole_seconds(self.last_failure),
-            "lastFailureReason": self.last_failure_reason,
+            "timesSent": self.sent,
             "failsCounter": self.fails,
+            "lastFailureReason": self.failure,
         }
-        return {name: value for name, value in counters.items() if value}
-
-
-def _whole_seconds(at: float | None) -> str | None:
-    return None if at is None else date_iso(int(at))
-
-
-def read_subscription(
-    raw: Mapping[str, object], service: str, path: str
-) -> Subscription:
-    """Read a subscription from a ``POST``.
-
-    Raises:
-        FiwareError: 400 or 501.
-    """
-    return Subscription(new_id(), _read(raw), path, service)
+        shown["notification"] |= {key: what for key, what in counters.items() if what}
+        return {"id": self.id, **shown}
 
 
 _log = logging.getLogger(__name__)
 MOST_WAITING = 300
 """Of one lane: ten seconds of one kind of a robot's measures at 30 Hz."""
-MOST_AHEAD = 4
-"""Requests on a kept connection before their responses: a busy receiver answers one in
-a turn of its loop then, and one in two turns without."""
 IDLE_S = 2.0
 """A connection that was idle for longer is not used again: Node.js closes after 5 s."""
+
+_DEFAULT_TIMEOUT_MS = 5000
+_LENGTH = re.compile(rb"\r\ncontent-length: *(\d+)")
 
 REFUSED = "Couldn't connect to server"
 TIMED_OUT = "Timeout was reached"
@@ -329,30 +209,26 @@ CLOSED = "Server returned nothing (no headers, no data)"
 
 
 class Outbox:
-    """The lanes of all subscriptions.
+    """The lanes of all subscriptions."""
 
-    Args:
-        now: Returns Unix time (s), for the moment of a response.
-    """
-
-    def __init__(self, now: Callable[[], float]) -> None:
-        self._now = now
+    def __init__(self) -> None:
         self._lanes: dict[str, dict[object, Lane]] = {}
 
-    def post(self, subscription: Subscription, entity: Entity, now: float) -> None:
+    def post(self, subscription: Subscription, entity: Entity) -> None:
         """Send one entity to one subscriber."""
         lanes = self._lanes.setdefault(subscription.id, {})
         lane = lanes.get(entity.key)
         if lane is None or lane.document is not subscription.document:
             if lane is not None:
                 lane.close()
-            lane = lanes[entity.key] = Lane(subscription, self._now)
-        body = b'{"subscriptionId":%b,"data":[%b]}' % (
-            quoted(subscription.id),
-            write_entity(entity, subscription.document.notification.view),
+            lane = lanes[entity.key] = Lane(subscription)
+        notification = subscription.document.notification
+        view = EntityView(notification.attrs, notification.attrs_format == "keyValues")
+        subscription.sent += 1
+        lane.send(
+            b'{"subscriptionId":"%b","data":[%b]}'
+            % (subscription.id.encode(), write_entity(entity, view))
         )
-        subscription.sent(now)
-        lane.send(body)
 
     def forget(self, subscription_id: str) -> None:
         """Close the connections of a subscription; what waits is lost."""
@@ -369,175 +245,109 @@ class Lane:
     """A queue and one connection to a receiver, in order.
 
     Args:
-        subscription: Whose notifications it sends; told of each outcome.
-        now: Returns Unix time (s).
+        subscription: Records how each of its notifications ends.
 
     Attributes:
         document: The version of the subscription that it serves.
     """
 
-    def __init__(self, subscription: Subscription, now: Callable[[], float]) -> None:
+    def __init__(self, subscription: Subscription) -> None:
         self.document = subscription.document
-        self._endpoint = self.document.notification.endpoint
+        self._receiver = _receiver_of(self.document)
         self._head = _write_head(subscription)
         self._subscription = subscription
-        self._now = now
-        self._waiting: deque[bytes] = deque()
+        self._waiting: asyncio.Queue[bytes] = asyncio.Queue(MOST_WAITING)
         self._is_overflowing = False
-        self._connection: _Connection | None = None
-        self._under_way = 0
-        self._patience: asyncio.TimerHandle | None = None
-        """Ends what is under way where no response comes."""
+        self._streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = None
+        self._loop = asyncio.get_running_loop()
+        self._used_at = self._loop.time()
+        self._task = self._loop.create_task(self._run(), name="embedded-notifications")
 
     def send(self, body: bytes) -> None:
         """Queue one notification; of a full queue the oldest gives way."""
-        if len(self._waiting) >= MOST_WAITING:
-            self._waiting.popleft()
-            self._subscription.failed(self._now(), TIMED_OUT)
+        if self._waiting.full():
+            self._waiting.get_nowait()
+            self._subscription.ended(TIMED_OUT)
             if not self._is_overflowing:
-                _log.warning("%s reads too slowly: oldest dropped", self._endpoint.url)
+                _log.warning("%s reads too slowly: oldest dropped", self._receiver.url)
                 self._is_overflowing = True
-        self._waiting.append(body)
-        self._send_next()
+        self._waiting.put_nowait(body)
 
     def close(self) -> None:
         """Close the connection; what waits is lost."""
-        self._waiting.clear()
+        self._task.cancel()
         self._hang_up()
 
-    def end(self, connection: "_Connection", status: int, reason: str = "") -> None:
-        """Take a response, or the end of a connection, and send what waits.
+    async def _run(self) -> None:
+        """Send what is queued, until cancelled."""
+        limit_s = (self._receiver.timeout or _DEFAULT_TIMEOUT_MS) / 1000
+        while True:
+            body = await self._waiting.get()
+            failure = ""
+            try:
+                async with asyncio.timeout(limit_s):
+                    await self._exchange(body)
+            except TimeoutError:
+                failure = TIMED_OUT
+            except (OSError, EOFError, ValueError, asyncio.LimitOverrunError):
+                failure = CLOSED if self._streams else REFUSED
+            if failure:
+                self._hang_up()
+            self._subscription.ended(failure)
+            if self._is_overflowing and self._waiting.empty():
+                _log.warning("%s has caught up", self._receiver.url)
+                self._is_overflowing = False
 
-        Args:
-            connection: Where it came from.
-            status: That of the response; 0 for none.
-            reason: In place of a response, in libcurl's words.
+    async def _exchange(self, body: bytes) -> None:
+        """Send one notification and read the response, whatever its status.
+
+        Raises:
+            OSError: the connection failed.
+            EOFError: the receiver closed it.
+            ValueError: the response is no HTTP.
         """
-        if connection is not self._connection:
-            return
-        if status and self._under_way:
-            self._under_way -= 1
-            self._subscription.succeeded(self._now(), status)
-        self._stop_patience()
-        if not (status and connection.is_kept):
-            for _ in range(self._under_way):
-                self._subscription.failed(self._now(), reason or CLOSED)
+        reader, writer = await self._connect()
+        writer.write(b"%bContent-Length: %d\r\n\r\n%b" % (self._head, len(body), body))
+        head = (await reader.readuntil(b"\r\n\r\n")).lower()
+        if not head.startswith(b"http/1."):
+            raise ValueError(head)
+        length = _LENGTH.search(head)
+        await reader.readexactly(int(length[1]) if length else 0)
+        is_whole = length is not None or head.startswith(b"http/1.1 204")
+        if not is_whole or b"connection: close" in head or b"http/1.0" in head:
             self._hang_up()
-        self._send_next()
+        self._used_at = self._loop.time()
 
-    def _send_next(self) -> None:
-        loop = asyncio.get_running_loop()
-        while self._waiting:
-            connection = self._connection_to_use(loop.time())
-            if self._under_way >= (MOST_AHEAD if connection.is_kept else 1):
-                break
-            body = self._waiting.popleft()
-            length = b"Content-Length: %d\r\n\r\n" % len(body)
-            connection.send(self._head + length + body)
-            self._under_way += 1
-        if self._is_overflowing and not self._waiting:
-            _log.warning("%s has caught up", self._endpoint.url)
-            self._is_overflowing = False
-        if self._under_way and self._patience is None:
-            self._patience = loop.call_later(self._endpoint.timeout_s, self._time_out)
-
-    def _time_out(self) -> None:
-        if self._connection is not None:
-            self.end(self._connection, 0, TIMED_OUT)
-
-    def _connection_to_use(self, now: float) -> "_Connection":
-        connection = self._connection
-        is_idle = connection is not None and not self._under_way
-        if connection is None or (is_idle and now - connection.used_at > IDLE_S):
+    async def _connect(self) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+        """The kept connection where it is of use, else a new one."""
+        is_old = self._loop.time() - self._used_at > IDLE_S
+        if self._streams is not None and (is_old or self._streams[0].at_eof()):
             self._hang_up()
-            connection = self._connection = _Connection(self, self._endpoint.url)
-        return connection
+        if self._streams is None:
+            url = urlsplit(self._receiver.url)
+            is_tls = url.scheme == "https"
+            port = url.port or (443 if is_tls else 80)
+            streams = asyncio.open_connection(url.hostname, port, ssl=is_tls or None)
+            self._streams = await streams
+        return self._streams
 
     def _hang_up(self) -> None:
-        self._stop_patience()
-        self._under_way = 0
-        if self._connection is not None:
-            self._connection.close()
-            self._connection = None
-
-    def _stop_patience(self) -> None:
-        if self._patience is not None:
-            self._patience.cancel()
-            self._patience = None
+        if self._streams is not None:
+            self._streams[1].transport.abort()
+            self._streams = None
 
 
-class _Connection(asyncio.Protocol):
-    """One connection of a lane, which it tells each response.
-
-    Attributes:
-        is_kept: Whether the receiver keeps it after the last response.
-        used_at: Time of the last response (loop time, s).
-    """
-
-    def __init__(self, lane: Lane, url: str) -> None:
-        self._lane = lane
-        self._parser = httptools.HttpResponseParser(self)
-        self._transport: asyncio.Transport | None = None
-        self._request = b""
-        self.is_kept = False
-        loop = asyncio.get_running_loop()
-        self.used_at = loop.time()
-        self._opening = loop.create_task(self._open(url), name="embedded-notifications")
-
-    async def _open(self, url: str) -> None:
-        parts = urlsplit(url)
-        context = ssl.create_default_context() if parts.scheme == "https" else None
-        port = parts.port or (443 if context else 80)
-        try:
-            await asyncio.get_running_loop().create_connection(
-                lambda: self, parts.hostname or "", port, ssl=context
-            )
-        except OSError:
-            self._lane.end(self, 0, REFUSED)
-
-    def send(self, request: bytes) -> None:
-        """Send a request, at the latest when it is open."""
-        if self._transport is None:
-            self._request = request
-        else:
-            self._transport.write(request)
-
-    def close(self) -> None:
-        """Close it at once."""
-        self._opening.cancel()
-        if self._transport is not None:
-            self._transport.abort()
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Connected."""
-        self._transport = cast("asyncio.Transport", transport)
-        self._transport.write(self._request)
-
-    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002 - asyncio's
-        """Either side closed it."""
-        self._lane.end(self, 0, CLOSED)
-
-    def data_received(self, data: bytes) -> None:
-        """Part of a response."""
-        try:
-            self._parser.feed_data(data)
-        except httptools.HttpParserError:
-            self._lane.end(self, 0, CLOSED)
-
-    def on_message_complete(self) -> None:
-        """A response is complete, unless it only promises one."""
-        status = self._parser.get_status_code()
-        if status >= 200:
-            self.is_kept = self._parser.should_keep_alive()
-            self.used_at = asyncio.get_running_loop().time()
-            self._lane.end(self, status)
+def _receiver_of(document: SubscriptionDocument) -> Endpoint:
+    notification = document.notification
+    found = notification.http or notification.http_custom
+    assert found is not None  # noqa: S101 - checked by the model
+    return found
 
 
 def _write_head(subscription: Subscription) -> bytes:
     """The part of a request's head that does not change; no header is empty."""
-    notification = subscription.document.notification
-    url = urlsplit(notification.endpoint.url)
-    custom = {name.lower(): value for name, value in notification.headers.items()}
+    receiver = _receiver_of(subscription.document)
+    url = urlsplit(receiver.url)
     headers = {
         "host": url.netloc,
         "user-agent": "orion/4.7.0-next libcurl/7.88.1",
@@ -545,10 +355,10 @@ def _write_head(subscription: Subscription) -> bytes:
         "fiware-servicepath": subscription.path,
         "accept": "application/json",
         "content-type": "application/json; charset=utf-8",
-        "ngsiv2-attrsformat": notification.attrs_format,
+        "ngsiv2-attrsformat": subscription.document.notification.attrs_format,
     }
+    for name, value in (receiver.headers or {}).items():
+        headers[name.lower()] = value
     target = (url.path or "/") + (f"?{url.query}" if url.query else "")
-    lines = [
-        f"{name}: {value}" for name, value in {**headers, **custom}.items() if value
-    ]
+    lines = [f"{name}: {value}" for name, value in headers.items() if value]
     return "\r\n".join((f"POST {target} HTTP/1.1", *lines, "")).encode()

@@ -11,7 +11,7 @@ import asyncio
 import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import orjson
@@ -170,22 +170,25 @@ class EmulatedRobot:
         self._faults = FaultOrder(robot=self.robot_id)
         self._requested = REST
 
-    def _new_node(self, *, held: bool) -> RobotNode:
+    def _new_node(self) -> RobotNode:
         return RobotNode(
             self.robot_id,
-            self._settings.node,
+            replace(
+                self._settings.node,
+                read_clock=self._read_clock,
+                open_link=partial(
+                    EmulatedLink, is_mute=lambda: bool(self._faults.mute)
+                ),
+            ),
             profile=self._rig.profile,
             drive=self._obey_gate,
-            held=held,
             navigate=partial(self._rig.pursue, around=self._world),
-            read_clock=self._read_clock,
-            open_link=partial(EmulatedLink, is_mute=lambda: bool(self._faults.mute)),
         )
 
     async def run(self, began: float, phase: float) -> None:
         """Drive and sense until cancelled; ``began`` is when the run began."""
         self._run_began = began
-        self._node = self._new_node(held=self._settings.held)
+        self._node = self._new_node()
         if not self._settings.held:
             self._node.release_locally()
         async with asyncio.TaskGroup() as self._tasks:
@@ -256,7 +259,7 @@ class EmulatedRobot:
             self._node_task.cancel()
             self._node_task = None
         if order.revive and self._node_task is None:
-            self._node = self._new_node(held=True)
+            self._node = self._new_node()
             self._start_node()
 
     def _start_node(self) -> None:

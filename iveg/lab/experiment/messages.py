@@ -28,9 +28,10 @@ from iveg.adapters.subscriptions import (
 )
 from iveg.app.fiware import open_fiware
 from iveg.cli.nodes import broker_of
+from iveg.domain.clock_offset import LONGEST_S, STAMP_S
 from iveg.domain.errors import HopError, UnreadableError
 from iveg.domain.kinds import MEASURED
-from iveg.domain.latency import DATA, LONGEST_S, STAMP_S, Data, Segment, data_of
+from iveg.domain.latency import DATA, Data, Segment, data_of
 from iveg.domain.observations import kind_of
 from iveg.ngsi import codec, names
 from iveg.settings import Settings

@@ -29,7 +29,7 @@ from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
 from iveg.robot.orders import Drive, Effect, Report, SendAnswer
 from iveg.robot.safety import SafetyMachine
-from iveg.robot.uplink import Uplink
+from iveg.robot.uplink import Origins, Uplink
 from iveg.vital.ingest import Ingest
 from iveg.vital.loop import RuleLoop
 from iveg.web.views import Views
@@ -161,9 +161,8 @@ class StagedRobot:
         self._is_witness = is_witness
         self._wanted = 0.0
         self._heard: tuple[FeedbackRef, ...] = ()
-        self._uplink = Uplink(
-            rig.robot_id, "iveg", "b1", self._say, echoes=lambda: self._heard
-        )
+        origins = Origins("b1", echoes=lambda: self._heard)
+        self._uplink = Uplink(rig.robot_id, "iveg", origins, self._say)
         self._machine = SafetyMachine(
             rig.robot_id,
             "b1",

@@ -123,7 +123,7 @@ def _detection_of(box: payloads.BoxValue) -> Detection | None:
     return Detection(class_id, box.probability, position, frame_id, box.det_id)
 
 
-_LONGEST_M = 2 * LIMITS.ring_most_m
+_LONGEST_M = 2 * LIMITS.zone_most_m
 """A box that is longer says no place."""
 _HALF_M = 0.25
 """Algorithm 1 sends a point; it is drawn as a box of half a metre."""

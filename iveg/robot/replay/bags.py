@@ -1,7 +1,7 @@
 """ROS bags: odometry, scans and detections of recordings, placed by their TF."""
 
 import logging
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -23,103 +23,16 @@ from iveg.robot.grounding import DEFAULT as GROUNDING
 from iveg.robot.replay.logs import RecordingEntry
 from iveg.robot.ros2.config import Frames
 from iveg.robot.ros2.detections import Boxes, Camera, Places
-from iveg.robot.ros2.reading import InputFaults, read_pose, read_scan, read_twist
+from iveg.robot.ros2.reading import InputFaults, read_scan, read_twist
 from iveg.robot.ros2.topics import BOXES, LOOKS
-from iveg.robot.ros2.transforms import IDENTITY, RigidTransform
+from iveg.robot.ros2.transforms import IDENTITY, TransformBuffer
 from iveg.ros2 import cdr
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as ros
 from iveg.ros2.cdr import type_hash
 from iveg.ros2.messages import Message, definitions
 
-# --- bag files --------------------------------------------------------------------
-#
-# Bags of ROS 2 as files: their topics, and their messages as plain CDR.
-
-
-@dataclass(frozen=True, slots=True)
-class BagTopic:
-    """One topic of a bag, in one type.
-
-    Attributes:
-        count: Number of messages.
-        type_hash: ``RIHS01_…``; empty where the recorder wrote none.
-    """
-
-    name: str
-    type: str
-    count: int
-    type_hash: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class BagMessage:
-    """One message.
-
-    Attributes:
-        logged_s: When the recorder wrote it (Unix s).
-        payload: Plain CDR.
-    """
-
-    topic: str
-    logged_s: float
-    payload: bytes
-
-
-class BagFile:
-    """A bag, read from its start as often as asked, never held whole.
-
-    Args:
-        path: A file ``.db3`` or ``.mcap``, or a directory.
-
-    Raises:
-        DataFileError: it cannot be read.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        found: dict[tuple[str, str], BagTopic] = {}
-        with self._open() as reader:
-            for one in reader.connections:
-                key, count = (one.topic, one.msgtype), one.msgcount
-                if key in found:
-                    count += found[key].count
-                digest = one.digest if one.digest.startswith("RIHS01_") else ""
-                found[key] = BagTopic(*key, count, digest)
-        self.topics = tuple(found[key] for key in sorted(found))
-
-    def messages(self, topics: Collection[BagTopic]) -> Iterator[BagMessage]:
-        """Messages of these topics in the order in which they were recorded.
-
-        Raises:
-            DataFileError: the recording breaks off.
-        """
-        wanted = {(one.name, one.type) for one in topics}
-        with self._open() as reader:
-            connections = [
-                one for one in reader.connections if (one.topic, one.msgtype) in wanted
-            ]
-            records = reader.messages(connections=connections) if connections else ()
-            for connection, logged, data in records:
-                yield BagMessage(connection.topic, logged / 1e9, bytes(data))
-
-    @contextmanager
-    def _open(self) -> Iterator[Reader]:
-        try:
-            with Reader(self.path) as reader:
-                yield reader
-        except Exception as error:  # whatever a foreign or damaged file provokes
-            said = " ".join(str(error).split()) or type(error).__name__
-            raise self.unusable(f"cannot be read: {said.rstrip('.')}") from error
-
-    def unusable(self, reason: str) -> DataFileError:
-        """The error that this bag cannot be used; ``reason`` without its full stop."""
-        return DataFileError(str(self.path), "", f"{reason}.")
-
-
-# --- bag plan ---------------------------------------------------------------------
-#
-# Which topics of a bag are read, and as what.
+# --- which topics are read, and as what -----------------------------------------------
 
 DETECTORS: tuple[type[Message], ...] = tuple(dict.fromkeys((*BOXES, *LOOKS)))
 _Forms = Sequence[type[Message]]
@@ -165,6 +78,16 @@ AS_RECORDED = BagOptions()
 
 
 @dataclass(frozen=True, slots=True)
+class BagTopic:
+    """One topic of a bag, in one type; the hash is empty where none was written."""
+
+    name: str
+    type: str
+    count: int
+    type_hash: str
+
+
+@dataclass(frozen=True, slots=True)
 class Use:
     """A topic with its role and the type it is read in."""
 
@@ -177,17 +100,20 @@ class BagPlan:
     """Uses of all topics of a bag.
 
     Args:
-        file: The bag.
+        path: The bag, for complaints.
+        topics: All that it holds.
         options: Topics that are named.
 
     Raises:
         DataFileError: its topics leave open which is meant.
     """
 
-    def __init__(self, file: BagFile, options: BagOptions) -> None:
-        self._file = file
+    def __init__(
+        self, path: Path, topics: Sequence[BagTopic], options: BagOptions
+    ) -> None:
+        self._path, self._topics = path, topics
         self.read: dict[str, Use] = {}
-        self._whys: dict[BagTopic, str] = {}
+        self._fates: dict[BagTopic, str] = {}
         self._choose("odometry", (ros.Odometry,), options.odometry, "--odom-topic")
         self._choose("scan", (ros.LaserScan,), options.scan, "--scan-topic")
         for one in self._named((ros.TFMessage,)):
@@ -201,17 +127,11 @@ class BagPlan:
     def table(self) -> list[str]:
         """One line a topic: name, type, messages, and what becomes of it."""
         rows = [
-            (one.name, one.type, str(one.count), self._fate(one))
-            for one in self._file.topics
+            (one.name, one.type, str(one.count), self._fates.get(one, _NOT_NEEDED))
+            for one in self._topics
         ]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
-
-    def _fate(self, topic: BagTopic) -> str:
-        use = self.read.get(topic.name)
-        if use is not None and use.topic == topic:
-            return use.role
-        return f"ignored: {self._whys.get(topic, 'not needed')}"
 
     def _choose(
         self, role: str, forms: _Forms, wanted: str | None, option: str
@@ -223,7 +143,8 @@ class BagPlan:
         """
         chosen = self._named(forms, wanted, option)
         if len(chosen) > 1:
-            raise self._file.unusable(f"{option} must name one of {self._all(forms)}")
+            those = _those(forms, chosen)
+            raise _unusable(self._path, f"{option} must name one of {those}")
         return self._use(chosen[0], role) if chosen else None
 
     def _named(
@@ -235,24 +156,22 @@ class BagPlan:
             DataFileError: that one is not there.
         """
         kinds = {one.ROS for one in forms}
-        found = [one for one in self._file.topics if one.type in kinds]
+        found = [one for one in self._topics if one.type in kinds]
         named = [one for one in found if wanted in (None, one.name)]
         if wanted is not None and not named:
-            reason = f"{option} {wanted} is not among {self._all(forms)}"
-            raise self._file.unusable(reason)
+            those = _those(forms, found)
+            raise _unusable(self._path, f"{option} {wanted} is not among {those}")
         return named
-
-    def _all(self, forms: _Forms) -> str:
-        names = ", ".join(sorted({one.name for one in self._named(forms)})) or "none"
-        return f"those of {' or '.join(one.ROS for one in forms)}: {names}"
 
     def _use(self, topic: BagTopic, role: str) -> Use | None:
         """Read a topic, unless its type has other fields under the same name."""
         form = next(one for one in _FORMS if topic.type == one.ROS)
         if topic.type_hash not in ("", *map(type_hash, definitions(form))):
-            self._whys[topic] = f"another definition, {topic.type_hash}"
+            self._fates[topic] = f"ignored: another definition, {topic.type_hash}"
             return None
-        return self.read.setdefault(topic.name, Use(topic, role, form))
+        use = self.read.setdefault(topic.name, Use(topic, role, form))
+        self._fates.setdefault(use.topic, use.role)
+        return use
 
     def _choose_detector(self, options: BagOptions) -> None:
         """Boxes with depth first; those without need a depth picture and its camera."""
@@ -264,8 +183,9 @@ class BagPlan:
             return
         if chosen.form not in BOXES:
             del self.read[chosen.topic.name]
-            self._whys[chosen.topic] = (
-                "boxes in a picture; no --depth-topic with its --camera-info-topic"
+            self._fates[chosen.topic] = (
+                "ignored: boxes in a picture; no --depth-topic with its "
+                "--camera-info-topic"
             )
 
     def _take_depth(self, options: BagOptions) -> bool:
@@ -285,6 +205,19 @@ class BagPlan:
             return False
         taken = self._use(depth[0], "depth"), self._use(info[0], "camera_info")
         return None not in taken
+
+
+_NOT_NEEDED = "ignored: not needed"
+
+
+def _those(forms: _Forms, topics: Sequence[BagTopic]) -> str:
+    names = ", ".join(sorted({one.name for one in topics})) or "none"
+    return f"those of {' or '.join(one.ROS for one in forms)}: {names}"
+
+
+def _unusable(path: Path, reason: str) -> DataFileError:
+    """The error that a bag cannot be used; ``reason`` without its full stop."""
+    return DataFileError(str(path), "", f"{reason}.")
 
 
 # --- bag pass ---------------------------------------------------------------------
@@ -313,17 +246,17 @@ class BagPass:
     """
 
     def __init__(self, uses: Mapping[str, Use], tree: "BagTree", mount: Pose2D) -> None:
-        self._mount = mount
-        self._tree = tree
-        self._notes = _Notes()
-        self._places = Places(tree.frames, _MAX_AGE_S, self._notes)
+        self._mount, self._tree = mount, tree
+        self._lost = InputFaults()
+        """Of the newest message alone."""
+        self._places = Places(tree.frames, _MAX_AGE_S, self._lost)
         for links in tree.links:
             self._places.add(links, static=True)
         names = {use.role: name for name, use in uses.items()}
         seen = names.get("detections", "")
-        self._boxes = Boxes(seen, (), self._places, self._notes)
+        self._boxes = Boxes(seen, (), self._places, self._lost)
         called = {"detections_2d": seen, "depth": names.get("depth", "")}
-        self._camera = Camera(called, (), GROUNDING, self._places, self._notes)
+        self._camera = Camera(called, (), GROUNDING, self._places, self._lost)
         self._works: dict[str, Callable[[Any, Instant], BagObservation | None]] = {
             "odometry": self._odometry,
             "scan": self._scan,
@@ -340,24 +273,24 @@ class BagPass:
         Raises:
             UnreadableError: values out of range.
         """
-        self._notes.reasons.clear()
+        self._lost.clear()
         return self._works[use.role](message, Instant(now, now))
 
     def late_frame(self, now: float) -> DetectionFrame | None:
         """The detection frame that has waited for its depth picture."""
         return self._camera.locate(now)
 
-    def why_lost(self, use: Use, found: BagObservation | None) -> str:
+    def why_lost(self, use: Use, found: BagObservation | None, now: float) -> str:
         """Why a message gave no observation, or a box no place; else empty."""
         unplaced = isinstance(found, DetectionFrame) and found.unread
         if not unplaced and (found is not None or use.role not in _OWN):
             return ""
-        return next(iter(self._notes.reasons), _UNPLACED)
+        reasons = [f"{one.code}, {one.about}" for one in self._lost.faults(now)]
+        return reasons[0] if reasons else _UNPLACED
 
     def _odometry(self, message: ros.Odometry, now: Instant) -> Odometry | None:
         if self._tree.lacks_base:
-            pose = read_pose(message)
-            self._places.add(_link(message, pose), static=False)
+            self._places.add(_link(message), static=False)
         place = self._places.locate(message, now.mono)
         if place is None:
             return None
@@ -372,7 +305,10 @@ class BagPass:
         return None if mount is None else read_scan(message, mount)
 
     def _detections(self, message: Message, now: Instant) -> DetectionFrame | None:
-        if type(message) in BOXES and (type(message) not in LOOKS or _is_3d(message)):
+        is_3d = type(message) in BOXES and type(message) not in LOOKS
+        if isinstance(message, d.DetectionArray):
+            is_3d = any(one.bbox3d.frame_id for one in message.detections)
+        if is_3d:
             return self._boxes.locate(message, now.mono)
         self._camera.replace_look(message, now)
         return None
@@ -398,75 +334,39 @@ class BagTree:
         moving: Sequence[ros.TFMessage],
         odometry: ros.Odometry | None,
     ) -> None:
-        self._parents = {
-            _bare(one.child_frame_id): _bare(one.header.frame_id)
-            for message in (*static, *moving)
-            for one in message.transforms
-        }
-        usual = Frames()
-        odom = base = ""
+        known = TransformBuffer()
+        for message in (*static, *moving):
+            known.add(message, static=True)
+        self._up, usual, odom, base = known.chain, Frames(), "", ""
         if odometry is not None:
-            odom = _bare(odometry.header.frame_id)
-            base = _bare(odometry.child_frame_id)
+            odom = odometry.header.frame_id.lstrip("/")
+            base = odometry.child_frame_id.lstrip("/")
         odom, base = odom or usual.odom, base or usual.base_link
         if usual.base_link in self._up(base) or base in self._up(usual.base_link):
             base = usual.base_link  # odometry of a footprint
         self.frames = Frames(usual.map, odom, base)
         self.lacks_base = not {odom, usual.map} & set(self._up(base))
-        root = self._up(odom)[-1]
         self.links = [*static]
         if usual.map not in self._up(odom):
             header = ros.Header(frame_id=usual.map)
-            self.links.append(ros.TFMessage((ros.TransformStamped(header, root),)))
+            root = ros.TransformStamped(header, self._up(odom)[-1])
+            self.links.append(ros.TFMessage((root,)))
 
     def has_mount(self, frame: str) -> bool:
         """Whether the bag tells where a frame is on the robot."""
-        return bool(self._parents) and self.frames.base_link in self._up(_bare(frame))
-
-    def _up(self, frame: str) -> list[str]:
-        """A frame and its ancestors."""
-        found = [frame]
-        while (outer := self._parents.get(found[-1])) and outer not in found:
-            found.append(outer)
-        return found
+        return self.frames.base_link in self._up(frame.lstrip("/"))[1:]
 
 
-class _Notes(InputFaults):
-    """Reasons of what was just lost, beside faults that last."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.reasons: dict[str, None] = {}
-
-    def note(
-        self, code: str, about: str, now: float, for_s: float | None = None
-    ) -> None:
-        """Keep the reason, too."""
-        super().note(code, about, now, for_s)
-        self.reasons[f"{code}, {about}"] = None
-
-
-def _link(odometry: ros.Odometry, pose: RigidTransform) -> ros.TFMessage:
+def _link(odometry: ros.Odometry) -> ros.TFMessage:
     """Odometry as a transform."""
-    transform = ros.Transform(ros.Vector3(*pose.move), ros.Quaternion(*pose.q))
+    place, turned = odometry.pose.pose.position, odometry.pose.pose.orientation
+    transform = ros.Transform(ros.Vector3(place.x, place.y, place.z), turned)
     child = odometry.child_frame_id or Frames().base_link
     one = ros.TransformStamped(odometry.header, child, transform)
     return ros.TFMessage((one,))
 
 
-def _is_3d(message: Message) -> bool:
-    return isinstance(message, d.DetectionArray) and any(
-        one.bbox3d.frame_id for one in message.detections
-    )
-
-
-def _bare(frame: str) -> str:
-    return frame.lstrip("/")
-
-
 # --- bags -------------------------------------------------------------------------
-
-__all__ = ["AS_RECORDED", "Bag", "BagOptions"]
 
 _log = logging.getLogger(__name__)
 _LONGEST_S = 1e7
@@ -489,27 +389,23 @@ class Bag:
     """
 
     def __init__(
-        self,
-        path: Path,
-        options: BagOptions,
-        mount: Pose2D,
-        *,
-        needs_odometry: bool = True,
+        self, path: Path, options: BagOptions, mount: Pose2D, *, needs_odometry: bool
     ) -> None:
-        self._file = BagFile(path)
-        self.plan = plan = BagPlan(self._file, options)
+        self._path, self._mount = path, mount
+        self.plan = plan = BagPlan(path, _topics_of(path), options)
         if not plan.has("odometry") and (
             needs_odometry or not plan.has("scan", "detections")
         ):
-            raise self._file.unusable(f"holds no topic of type {ros.Odometry.ROS}")
-        self._mount = mount
+            raise _unusable(path, f"holds no topic of type {ros.Odometry.ROS}")
         self._reported: set[str] = set()
-        self._tree = self._look_ahead()
+        static = [*self._messages("tf_static")]
+        moving = [*islice(self._messages("tf"), _LINKS_AHEAD)]
+        self._tree = BagTree(static, moving, next(self._messages("odometry"), None))
         # Stamps count unless the first message has none: a bag uses one of the two
         # clocks throughout, since they may differ by years.
         first = next(self._messages(*_STAMPED), None)
-        stamp = 0.0 if first is None else first[1].header.stamp.seconds
-        self._bag_time = options.bag_time or (first is not None and stamp <= 0.0)
+        has_stamps = first is None or first.header.stamp.seconds > 0.0
+        self._bag_time = options.bag_time or not has_stamps
 
     def entries(self) -> Iterator[RecordingEntry]:
         """All entries, in the order in which they were recorded.
@@ -523,70 +419,80 @@ class Bag:
         this = BagPass(self.plan.read, self._tree, self._mount)
         start: float | None = None
         look_at = 0.0
-        for recorded, use in self._records():
+        for use, logged_s, payload in self._records():
             try:
-                message = cdr.read(use.form, recorded.payload)
-                found = this.observe(use, message, recorded.logged_s)
+                message = cdr.read(use.form, payload)
+                found = this.observe(use, message, logged_s)
             except UnreadableError as error:
-                self._report(recorded, str(error))
+                self._report(use, logged_s, str(error))
                 continue
-            at = self._time(recorded, message)
+            header = getattr(message, "header", None)
+            at = logged_s if self._bag_time or not header else header.stamp.seconds
             if use.role in _STAMPED:
                 start = at if start is None else start
             if use.role == "detections":
                 look_at = at
             if found is None:
-                found, at = this.late_frame(recorded.logged_s), look_at
-            if why := this.why_lost(use, found):
-                self._report(recorded, why)
-            if (
-                found is not None
-                and start is not None
-                and abs(at - start) <= _LONGEST_S
-            ):
-                yield RecordingEntry(at - start, found)
+                found, at = this.late_frame(logged_s), look_at
+            if why := this.why_lost(use, found, logged_s):
+                self._report(use, logged_s, why)
+            if found is None or start is None or abs(at - start) > _LONGEST_S:
+                continue
+            yield RecordingEntry(at - start, found)
 
-    def _time(self, recorded: BagMessage, message: object) -> float:
-        header = getattr(message, "header", None)
-        if self._bag_time or header is None:
-            return recorded.logged_s
-        return float(header.stamp.seconds)
-
-    # --- its messages -------------------------------------------------------------
-
-    def _records(self, *roles: str) -> Iterator[tuple[BagMessage, Use]]:
-        """Messages of topics with these roles; without, of all that are read."""
+    def _records(self, *roles: str) -> Iterator[tuple[Use, float, bytes]]:
+        """Messages with these roles, or all that are read; when written (Unix s)."""
         uses = {
-            name: use
+            (name, use.topic.type): use
             for name, use in self.plan.read.items()
             if not roles or use.role in roles
         }
-        for recorded in self._file.messages([one.topic for one in uses.values()]):
-            yield recorded, uses[recorded.topic]
+        with _open(self._path) as reader:
+            connections = [
+                one for one in reader.connections if (one.topic, one.msgtype) in uses
+            ]
+            records = reader.messages(connections=connections) if connections else ()
+            for source, logged, data in records:
+                yield uses[source.topic, source.msgtype], logged / 1e9, bytes(data)
 
-    def _messages(self, *roles: str) -> Iterator[tuple[BagMessage, Any]]:
+    def _messages(self, *roles: str) -> Iterator[Any]:
         """Those of them that can be read."""
-        for recorded, use in self._records(*roles):
+        for use, _, payload in self._records(*roles):
             with suppress(UnreadableError):
-                yield recorded, cdr.read(use.form, recorded.payload)
+                yield cdr.read(use.form, payload)
 
-    def _look_ahead(self) -> BagTree:
-        """Which frames the bag has."""
-        static = [one for _, one in self._messages("tf_static")]
-        moving = [one for _, one in islice(self._messages("tf"), _LINKS_AHEAD)]
-        _, odometry = next(self._messages("odometry"), (None, None))
-        return BagTree(static, moving, odometry)
+    def _report(self, use: Use, logged_s: float, why: str) -> None:
+        topic = use.topic.name
+        if topic not in self._reported:
+            self._reported.add(topic)
+            _log.warning(
+                "%s, %s: unusable messages are skipped, such as at %d ns: %s",
+                self._path,
+                topic,
+                round(logged_s * 1e9),
+                why,
+            )
 
-    # --- what is told -------------------------------------------------------------
 
-    def _report(self, recorded: BagMessage, why: str) -> None:
-        if recorded.topic in self._reported:
-            return
-        self._reported.add(recorded.topic)
-        _log.warning(
-            "%s, %s: unusable messages are skipped, such as at %d ns: %s",
-            self._file.path,
-            recorded.topic,
-            round(recorded.logged_s * 1e9),
-            why,
-        )
+def _topics_of(path: Path) -> list[BagTopic]:
+    """Topics of a bag by name; several recorded connections of one are joined."""
+    counts: dict[tuple[str, str, str], int] = {}
+    with _open(path) as reader:
+        for one in reader.connections:
+            digest = one.digest if one.digest.startswith("RIHS01_") else ""
+            key = one.topic, one.msgtype, digest
+            counts[key] = counts.get(key, 0) + one.msgcount
+    return [
+        BagTopic(name, kind, counts[name, kind, digest], digest)
+        for name, kind, digest in sorted(counts)
+    ]
+
+
+@contextmanager
+def _open(path: Path) -> Iterator[Reader]:
+    try:
+        with Reader(path) as reader:
+            yield reader
+    except Exception as error:  # whatever a foreign or damaged file provokes
+        said = " ".join(str(error).split()) or type(error).__name__
+        raise _unusable(path, f"cannot be read: {said.rstrip('.')}") from error

@@ -10,7 +10,7 @@ and detections are repeated, as the sensors of a robot at rest do.
 import asyncio
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -372,10 +372,9 @@ class ReplayedRobot:
         settings.node.directory.mkdir(parents=True, exist_ok=True)
         self._node = RobotNode(
             robot_id,
-            settings.node,
-            profile=self._profile,
+            replace(settings.node, replay=settings.frame or robot_id),
+            profile=profile,
             drive=self._drive,
-            replay=settings.frame or robot_id,
         )
 
     async def run(self) -> None:

@@ -1,7 +1,6 @@
 """``robot.toml``: names of a robot's topics and frames, and its drive.
 
-Absent keys have the defaults of ROS.  An invalid file is refused with line, column, key
-and reason.
+Absent keys have the defaults of ROS.  An invalid file is refused with key and reason.
 """
 
 from collections.abc import Mapping
@@ -151,14 +150,14 @@ def read_config(text: str, file: str) -> RobotConfig:
     """Read ``robot.toml``; ``file`` is its name in error messages.
 
     Raises:
-        DataFileError: naming file, line, column, key and reason.
+        DataFileError: naming file, key and reason.
     """
     page = read_table(text, file, _FileTable)
     for name, known in _KNOWN.items():
         for key in getattr(page, name):
             if key not in known:
                 reason = f"is unknown; known are {', '.join(known)}"
-                raise complaint(text, file, (name, key), reason)
+                raise complaint(file, (name, key), reason)
     return RobotConfig(
         domain=page.ros.domain,
         namespace=page.ros.namespace,

@@ -25,7 +25,6 @@ from iveg.robot.grounding import (
     ground,
     hull_of,
     top_left,
-    write_mask,
 )
 from iveg.robot.ros2 import reading
 from iveg.robot.ros2.config import Frames
@@ -198,7 +197,7 @@ class Boxes:
             self._detection(one, places[one.header.frame_id or usual], now)
             for one in found.detections
         ]
-        return frame_of("", UNKNOWN_ORIGIN, answers)
+        return frame_of(answers)
 
     def _detection(
         self, one: ros.Detection3D, place: RigidTransform | None, now: float
@@ -324,7 +323,7 @@ def grounded(
         )
         for number, one in enumerate(look.detections, 1)
     ]
-    return frame_of("", UNKNOWN_ORIGIN, answers)
+    return frame_of(answers)
 
 
 def _place(
@@ -366,8 +365,7 @@ def _segment(
     else:
         part = _cut(owners, corner, width, height)
         own = (part == number) | (part == _ANY)
-    bits = write_mask(own)
-    return Segment(class_id, probability, centre.x, centre.y, width, height, bits)
+    return Segment(class_id, probability, centre.x, centre.y, own)
 
 
 def _cut(

@@ -4,7 +4,6 @@ import asyncio
 import logging
 import math
 from collections.abc import Callable, Iterable, Sequence
-from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,8 +14,8 @@ from iveg.domain.costmap import UNKNOWN, InflatedGrid
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.goals import Goal
-from iveg.robot.costmap import PEER_M, FleetCostmap, Neighbour, Neighbours
-from iveg.robot.ros2.config import DriveConfig
+from iveg.robot.costmap import FleetCostmap, Neighbour, Neighbours
+from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.reading import InputFaults, read_twist, write_twist
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as ros
@@ -81,25 +80,17 @@ class Network(Protocol):
 
 def message_of(*, stamped: bool) -> type[Message]:
     """Message type of a topic of twists."""
-    return ros.TwistStamped if stamped else ros.Twist
+    kind: type[Message] = ros.TwistStamped if stamped else ros.Twist
+    return kind
 
 
 class DriveTopics:
-    """Reads ``cmd_vel_in``, writes ``cmd_vel_out``.
+    """Reads ``cmd_vel_in``, writes ``cmd_vel_out``; notes what is wrong."""
 
-    Args:
-        drive: Type of each of the two topics.
-        topic: Full name of ``cmd_vel_in``, for faults.
-        base_link: Frame of stamped twists.
-        input_faults: Record of faults.
-    """
-
-    def __init__(
-        self, drive: DriveConfig, topic: str, base_link: str, input_faults: InputFaults
-    ) -> None:
-        self._drive = drive
-        self._topic = topic
-        self._base_link = base_link
+    def __init__(self, config: RobotConfig, input_faults: InputFaults) -> None:
+        self._drive = config.drive
+        self._topic = config.full_topics["cmd_vel_in"]
+        self._base_link = config.frames.base_link
         self._input_faults = input_faults
         self._newest = 0.0
 
@@ -130,13 +121,7 @@ class DriveTopics:
         if self._drive.stamped_out:
             header = ros.Header(ros.Time.of(wall), self._base_link)
             return cdr.write(ros.TwistStamped(header, write_twist(twist)))
-        return _unstamped(twist)
-
-
-@lru_cache(maxsize=1)
-def _unstamped(twist: Twist2D) -> bytes:
-    """Bytes of a twist, which stays the same for long."""
-    return cdr.write(write_twist(twist))
+        return cdr.write(write_twist(twist))
 
 
 # --- goal pose --------------------------------------------------------------------
@@ -180,6 +165,7 @@ REACH_M = 8.0
 _SPACING_M = 0.1
 _HEIGHT_M = 0.5
 _RAYS = 1440
+_FLOAT32 = 7
 
 
 def cloud(
@@ -196,22 +182,24 @@ def cloud(
         ros.Header(stamp, frame),
         1,
         len(points),
-        tuple(ros.PointField(name, 4 * n) for n, name in enumerate("xyz")),
+        tuple(ros.PointField(name, 4 * n, _FLOAT32, 1) for n, name in enumerate("xyz")),
         False,
         12,
         12 * len(points),
         points.view(np.uint8).reshape(-1),
+        True,
     )
 
 
-def _circle() -> NDArray[np.float64]:
-    angles = np.arange(_RAYS) * (math.tau / _RAYS)
-    far = REACH_M + 1.0
-    height = np.full(_RAYS, _HEIGHT_M)
-    return np.stack((far * np.cos(angles), far * np.sin(angles), height), axis=1)
-
-
-_CIRCLE = _circle()
+_ANGLES = np.arange(_RAYS) * (math.tau / _RAYS)
+_CIRCLE = np.stack(
+    (
+        (REACH_M + 1.0) * np.cos(_ANGLES),
+        (REACH_M + 1.0) * np.sin(_ANGLES),
+        np.full(_RAYS, _HEIGHT_M),
+    ),
+    axis=1,
+)
 
 
 def _disc(one: Neighbour, own: Pose2D) -> NDArray[np.float64]:
@@ -245,50 +233,29 @@ def markers(
     neighbours: Iterable[Neighbour], stamp: ros.Time, frame: str
 ) -> ros.MarkerArray:
     """Body, radius and name of each, with a lifetime of a second."""
+    header, white = ros.Header(stamp, frame), ros.ColorRGBA(1.0, 1.0, 1.0, 1.0)
     found: list[ros.Marker] = []
     for number, one in enumerate(neighbours):
-        place = ros.Point(one.x, one.y, 0.9)
-        red = ros.ColorRGBA(0.9, 0.2, 0.1, 0.9)
-        body = red if one.kind == "person" else ros.ColorRGBA(0.1, 0.4, 0.9, 0.9)
-        ring = ros.ColorRGBA(body.r, body.g, body.b, 0.15)
-        header = ros.Header(stamp, frame)
-        found += [
-            _marker(header, f"{one.kind} body", number, place, 2 * one.radius, body),
-            _marker(header, f"{one.kind} ring", number, place, 2 * one.zone_m, ring),
-            ros.Marker(
+        hue = (0.9, 0.2, 0.1) if one.kind == "person" else (0.1, 0.4, 0.9)
+        body, ring = ros.ColorRGBA(*hue, 0.9), ros.ColorRGBA(*hue, 0.15)
+        for name, kind, z, width, height, color, text in (
+            ("body", _CYLINDER, 0.9, 2 * one.radius, 1.8, body, ""),
+            ("ring", _CYLINDER, 0.01, 2 * one.zone_m, 0.02, ring, ""),
+            ("name", _TEXT, 2.1, 0.0, 0.4, white, one.name),
+        ):
+            marker = ros.Marker(
                 header,
-                f"{one.kind} name",
+                f"{one.kind} {name}",
                 number,
-                _TEXT,
-                pose=ros.Pose(ros.Point(one.x, one.y, 2.1)),
-                scale=ros.Vector3(0.0, 0.0, 0.4),
-                color=ros.ColorRGBA(1.0, 1.0, 1.0, 1.0),
+                kind,
+                pose=ros.Pose(ros.Point(one.x, one.y, z)),
+                scale=ros.Vector3(width, width, height),
+                color=color,
                 lifetime=ros.Duration(_MARKER_LIVES_S),
-                text=one.name,
-            ),
-        ]
+                text=text,
+            )
+            found.append(marker)
     return ros.MarkerArray(tuple(found))
-
-
-def _marker(
-    header: ros.Header,
-    ns: str,
-    number: int,
-    place: ros.Point,
-    width: float,
-    color: ros.ColorRGBA,
-) -> ros.Marker:
-    flat = width > 2 * PEER_M
-    return ros.Marker(
-        header,
-        ns,
-        number,
-        _CYLINDER,
-        pose=ros.Pose(ros.Point(place.x, place.y, 0.01) if flat else place),
-        scale=ros.Vector3(width, width, 0.02 if flat else 1.8),
-        color=color,
-        lifetime=ros.Duration(_MARKER_LIVES_S),
-    )
 
 
 # --- costmap ----------------------------------------------------------------------

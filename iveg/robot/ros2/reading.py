@@ -116,7 +116,7 @@ def _ranges(scan: ros.LaserScan) -> NDArray[np.float32]:
     Only +inf says that nothing came back.  NaN is no measurement and -inf is too near
     for one: neither shows that the way is free.
     """
-    ranges = scan.ranges.copy()
+    ranges: NDArray[np.float32] = scan.ranges.copy()
     odd = ranges.view(np.uint32) > _FARTHEST_BITS
     ranges[odd] = np.where(ranges[odd] > 0.0, _NOTHING, _UNKNOWN)
     return ranges
@@ -290,6 +290,10 @@ class InputFaults:
         if fresh and len(self._noted) >= _MOST:
             del self._noted[min(self._noted, key=lambda one: self._noted[one].last)]
         self._noted[key] = _Noted(since, now, for_s)
+
+    def clear(self) -> None:
+        """Forget all of them."""
+        self._noted.clear()
 
     def faults(self, now: float) -> tuple[RobotFault, ...]:
         """Present faults, in the order of their start."""

@@ -8,20 +8,20 @@ drive's topic, repeatedly while it is zero; when this process ends, so does publ
 import asyncio
 import itertools
 import logging
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from iveg.adapters import clock
 from iveg.domain.errors import HopError
 from iveg.domain.feedback import Feedback
-from iveg.domain.fleet import CAUTIOUS
-from iveg.domain.geometry import Rectangle, Twist2D
+from iveg.domain.fleet import RobotProfile
+from iveg.domain.geometry import Twist2D
 from iveg.domain.goals import Goal
 from iveg.domain.observations import RobotFault
 from iveg.domain.witness import Outline
 from iveg.robot.costmap import FleetCostmap, Neighbours
-from iveg.robot.goals import Navigate
-from iveg.robot.node import RobotNode, every
+from iveg.robot.node import NodeSettings, RobotNode, every
 from iveg.robot.ros2 import outputs
 from iveg.robot.ros2.checking import Lookout, forms_published
 from iveg.robot.ros2.config import RobotConfig
@@ -47,19 +47,13 @@ RATE_HZ = 30.0
 _DEPTH = 50
 """Pending messages after a thirtieth of a second that count as a flood."""
 _OWN_STALL_S = 0.15
-"""After a longer pause between two readings a full queue shows our own delay."""
+"""After a longer pause between two readings of the sensors a full queue, of sensors
+or of requested velocities, shows our own delay."""
 _PICTURE_DEPTH = 2
 _LOOK_ROUND_TICKS, _TELL_TICKS = 15, 6
 """Ticks between two checks of endpoints, and between two outputs of neighbours."""
 _KNOWN_WITHIN_S = 8.0
 _ORDER = list(TOPICS)
-_LARGE = Outline(CAUTIOUS.length, CAUTIOUS.width)
-
-
-NodeMaker = Callable[
-    [Callable[[Twist2D], None], Callable[[str, Feedback], None], Navigate], RobotNode
-]
-"""Makes the safety node from its drive, a callback for feedback, and navigation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,11 +81,9 @@ class Ros2Robot:
         robot_id: Its id in iVeg.
         config: Names of topics and frames.
         network: The network.
-        make_node: Makes its safety node.
-        classes: A detector's class names by number.
-        sim_time: Stamps are a simulator's.
-        outline: The robot's footprint.
-        area: What its costmap covers; None: a window round it.
+        inputs: Its sensors.
+        settings: Those of its safety node; its costmap covers the plan's bounds.
+        profile: Its body and drive.
     """
 
     def __init__(
@@ -99,34 +91,36 @@ class Ros2Robot:
         robot_id: str,
         config: RobotConfig,
         network: Network,
-        make_node: NodeMaker,
-        *,
-        classes: tuple[str, ...] = (),
-        sim_time: bool = False,
-        outline: Outline = _LARGE,
-        area: Rectangle | None = None,
+        inputs: SensorInputs,
+        settings: NodeSettings,
+        profile: RobotProfile,
     ) -> None:
         self._id = robot_id
         self._config, self._names = config, config.full_topics
         self._network = network
-        self.inputs = SensorInputs(config, classes, sim_time=sim_time)
-        self._input_faults = self.inputs.input_faults
-        self._topics = DriveTopics(
-            config.drive,
-            self._names["cmd_vel_in"],
-            config.frames.base_link,
-            self._input_faults,
-        )
+        self.inputs, self._faults = inputs, inputs.input_faults
+        self._topics = DriveTopics(config, self._faults)
         self._neighbours = Neighbours(robot_id)
-        self._fleet_costmap = FleetCostmap(robot_id, outline, area)
+        self._fleet_costmap = FleetCostmap(
+            robot_id,
+            Outline(profile.length, profile.width),
+            None if settings.plan is None else settings.plan.bounds,
+        )
         self._said: frozenset[tuple[str, str]] = frozenset()
         self._first_feedback: float | None = None
         self._known = False
-        self._lookout = Lookout(config, self._input_faults, clock.mono())
+        self._lookout = Lookout(config, self._faults, clock.mono())
         self._ticks = itertools.count()
-        self._sensed_at = float("-inf")
+        self._sensed_at = self._stalled_at = -math.inf
         self._open(network)
-        self.node = make_node(self._drive, self._on_feedback, self.navigate)
+        self.node = RobotNode(
+            robot_id,
+            settings,
+            profile=profile,
+            drive=self._drive,
+            navigate=self.navigate,
+            on_feedback=self.hear_feedback,
+        )
         self._costmap = self._open_costmap(network)
 
     def _open(self, network: Network) -> None:
@@ -136,7 +130,7 @@ class Ros2Robot:
             for form in TOPICS[topic].forms:
                 # Codecs are made before the robot drives, not when a detector joins.
                 for one in definitions(form):
-                    cdr.store_of(one)
+                    one.STORE.get_msgdef(one.ROS)
             if len(TOPICS[topic].forms) == 1:
                 self._listen(topic, TOPICS[topic].message)
         self._wishes = network.reader(
@@ -206,19 +200,25 @@ class Ros2Robot:
 
     def _sense(self) -> None:
         now = clock.now()
-        is_in_time = now.mono - self._sensed_at <= _OWN_STALL_S
+        if now.mono - self._sensed_at > _OWN_STALL_S:
+            self._stalled_at = now.mono
         self._sensed_at = now.mono
+        is_late = self._is_late(now.mono)
         for one in self._ins:
-            waited = one.reader.take()
-            if waited:
+            if waited := one.reader.take():
                 form = TOPICS[one.topic].form(one.form.ROS)
-                most = one.most if is_in_time else 0
+                most = 0 if is_late else one.most
                 self.inputs.hear(one.topic, waited, now.mono, most, form)
         self.node.sense(*self.inputs.tick(now))
         self._judge(now.mono)
 
+    def _is_late(self, now: float) -> bool:
+        """Whether the gate itself stood still until now: a full queue is its own."""
+        stands_still = now - self._sensed_at > _OWN_STALL_S
+        return stands_still or now - self._stalled_at < 1 / RATE_HZ
+
     def _judge(self, now: float) -> None:
-        faults = self._input_faults.faults(now)
+        faults = self._faults.faults(now)
         self.node.limit(*speed_of(faults))
         self.node.set_faults(faults)
         if faults or self._said:
@@ -236,8 +236,8 @@ class Ros2Robot:
     def _on_wish(self) -> None:
         now = clock.mono()
         waited = self._wishes.take()
-        if len(waited) >= _DEPTH:
-            self._input_faults.note("flood", self._names["cmd_vel_in"], now)
+        if len(waited) >= _DEPTH and not self._is_late(now):
+            self._faults.note("flood", self._names["cmd_vel_in"], now)
         if not waited:
             return
         wish = self._topics.read(waited[-1], now)
@@ -251,7 +251,7 @@ class Ros2Robot:
         self._meet_detectors(endpoints)
         first = self._first_feedback
         if not self._known and first is not None and now - first > _KNOWN_WITHIN_S:
-            self._input_faults.note("unknown_to_iveg", self._id, now)
+            self._faults.note("unknown_to_iveg", self._id, now)
 
     def _meet_detectors(self, endpoints: Sequence[Endpoint]) -> None:
         """Listen to a detector in the type in which it publishes.
@@ -276,7 +276,8 @@ class Ros2Robot:
                     _log.warning("%s: %s comes as %s now", self._id, name, form.ROS)
                 self._listen(topic, form, raw=raw)
 
-    def _on_feedback(self, peer: str, feedback: Feedback) -> None:
+    def hear_feedback(self, peer: str, feedback: Feedback) -> None:
+        """Take iVeg's feedback of a peer's topic."""
         now = clock.mono()
         if self._first_feedback is None:
             self._first_feedback = now
@@ -293,7 +294,7 @@ class Ros2Robot:
             # No command arrives, so the base halts by its own time-out.
             _log.debug("%s: %s", self._id, error)
             out = self._names["cmd_vel_out"]
-            self._input_faults.note("drive_refused", out, clock.mono())
+            self._faults.note("drive_refused", out, clock.mono())
 
     def navigate(self, goal: Goal | None) -> bool:
         """Publish a goal; a topic takes none back, so to give up is to stay here."""

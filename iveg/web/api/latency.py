@@ -12,12 +12,12 @@ import orjson
 from fastapi import APIRouter, Depends, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from iveg.domain.clock_offset import ClockOffset
 from iveg.domain.latency import (
     DATA,
     PAPER,
     SEGMENTS,
     Cell,
-    ClockOffset,
     Data,
     LatencyWatch,
     Sketch,

@@ -12,15 +12,8 @@ from iveg.web.views import Views
 class Encoder:
     """Turns topics into frames, each version once."""
 
-    def __init__(
-        self,
-        views: Views,
-        hub: Hub,
-        clock: Clock,
-    ) -> None:
-        self._views = views
-        self._hub = hub
-        self._clock = clock
+    def __init__(self, views: Views, hub: Hub, clock: Clock) -> None:
+        self._views, self._hub, self._clock = views, hub, clock
         self.telemetry = TelemetryEncoder(views, hub)
         self._frames: dict[str, tuple[int, bytes]] = {}
 

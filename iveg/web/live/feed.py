@@ -4,17 +4,12 @@ Positions go as often as the page paints.  Other parts go as often as eyes need:
 or a detection frame is looked at, not measured, and digits that change more than ten
 times a second cannot be read.
 
-Credit: how much telemetry may be on its way to one browser.
-
 Buffers of the kernel, of the server and of the browser are queues without a size, and
 telemetry that waits in them shows the past.  So the page says which frame it has
 painted, and no more than a window of unpainted frames is ever sent: further changes
-wait in slots, where the newest wins.
-
-Δt₄: frames that a page reports as drawn, compared with their content.
-
-Only frames that the server sent itself are measured, so a page can be wrong about the
-moment alone; an impossible moment is not used.
+wait in slots, where the newest wins.  The same reports tell Δt₄, from the decision to
+the drawn frame.  Only frames that the server sent itself are measured, so a page can be
+wrong about the moment alone; an impossible moment is not used.
 """
 
 import math
@@ -26,7 +21,7 @@ from iveg.domain.latency import Data, LatencyWatch
 from iveg.domain.observations import Instant
 from iveg.vital import topics
 from iveg.vital.publish import Subscriber
-from iveg.web.live.telemetry import Part, TelemetryEncoder, write_frame
+from iveg.web.live.telemetry import LIST_S, Part, TelemetryEncoder, write_frame
 from iveg.web.presses import read_number
 
 SUBPROTOCOL: Final = "iveg.2"
@@ -35,11 +30,11 @@ SUBPROTOCOL: Final = "iveg.2"
 FRAMES: Final = 8
 """Spread over the round trip: 300 ms away a page still gets 26 frames a second."""
 BYTES: Final = 24_576
-"""Of what is heavy in them (scans, detections, people): 0.2 s of a line of 1 Mbit/s."""
+"""Heavy content in them (scans, detections, people): 0.2 s of a line of 1 Mbit/s."""
 GAP_S: Final = 0.002
 """Frames nearer to each other would cost more than the freshness that they bring."""
 ROBOT_GAP_S: Final = 0.0002
-"""The same for each robot of the fleet, where that is more: 4 ms with twenty."""
+"""Gap for each robot of the fleet, where that is more: 4 ms with twenty."""
 SLOW_FRAME_S: Final = 0.03
 """A page that draws for longer than this twice is slow."""
 
@@ -202,11 +197,9 @@ class Painting:
 
 PICTURE_S: Final = 1 / 15
 """Between two scans, or detection frames, of one robot."""
-READ_OUT_S: Final = 0.1
-"""Between two states of one robot, or lists of people."""
-PEOPLE_A_BEAT: Final = 50
-"""Of more the list is sent so much less often: each takes 0.1 ms to write."""
-STATES_AFTER_S: Final = READ_OUT_S / 2
+STATE_S: Final = 0.2
+"""Between two states of one robot, whose digits are read."""
+STATES_AFTER_S: Final = LIST_S / 2
 """States of robots come this long after lists of people: each takes long to write."""
 
 _INF: Final = float("inf")
@@ -247,7 +240,7 @@ class TelemetryFeed:
             self._subscriber.wake()
 
     def wait_s(self, now: float) -> float | None:
-        """How long until there may be a frame (s); None: until something changes.
+        """Time until there may be a frame (s); None: until something changes.
 
         Meanwhile a change of telemetry wakes nobody unless it could be sent at once.
         """
@@ -330,8 +323,7 @@ class TelemetryFeed:
 
     def _next_list(self, sent_at: float) -> float:
         """When a list of people may be sent again (monotonic, s)."""
-        beats = max(1, math.ceil(self._encoder.listed / PEOPLE_A_BEAT))
-        return _next_beat(sent_at + (beats - 1) * READ_OUT_S)
+        return _next_beat(sent_at + self._encoder.lists_apart_s - LIST_S, LIST_S)
 
     def _due_at(self) -> float:
         """Earliest time of a waiting part; parts without room wait for credit."""
@@ -425,15 +417,15 @@ def _next_picture(sent_at: float) -> float:
     return sent_at + PICTURE_S
 
 
-def _next_beat(sent_at: float) -> float:
+def _next_beat(sent_at: float, apart_s: float) -> float:
     """When a read-out may be sent again (monotonic, s).
 
     Read-outs of a kind go together, at the same moments to all browsers: what takes
     all robots and people is worked out once for all of them.
     """
-    return (math.floor(sent_at / READ_OUT_S + 1e-6) + 1) * READ_OUT_S
+    return (math.floor(sent_at / apart_s + 1e-6) + 1) * apart_s
 
 
 def _next_state(sent_at: float) -> float:
-    """The same of the state of a robot."""
-    return _next_beat(sent_at - STATES_AFTER_S) + STATES_AFTER_S
+    """When the state of a robot may be sent again (monotonic, s)."""
+    return _next_beat(sent_at - STATES_AFTER_S, STATE_S) + STATES_AFTER_S

@@ -22,6 +22,7 @@ from iveg.vital import topics
 from iveg.vital.ports import Clock
 from iveg.vital.publish import Hub
 from iveg.web.live.encoder import Encoder
+from iveg.web.live.feed import STATE_S
 from iveg.web.live.telemetry import NO_RETURN
 from iveg.web.views import Views
 
@@ -29,8 +30,6 @@ PICTURE_S: Final = 0.2
 """Between two pictures."""
 REFUSED_S: Final = 2.0
 """Until the next one where there was no room: a whole one costs more than changes."""
-YOUNG_S: Final = 0.1
-"""What was encoded for pages so lately is not encoded anew."""
 TURN_S: Final = 0.002
 """So long parts are written before others have their turn."""
 MOST_WAITING: Final = 16
@@ -148,14 +147,14 @@ class PictureRecorder:
                 scans.append(b'%b,"ranges":"%b"}' % (scan.head[:-1], ranges))
             return
         if row is topics.ROBOT:
-            part = telemetry.state(key, since, now, YOUNG_S)
+            part = telemetry.state(key, since, now, STATE_S)
             self._versions[topic] = since if part is None else part.version
             move = telemetry.move(key, now)
             if move is not None and move.head != self._moves.get(key):
                 self._moves[key] = move.head
                 moves.append(move.head)
         elif row is topics.PEOPLE:
-            part = telemetry.people(since, now, YOUNG_S)
+            part = telemetry.people(since, now, telemetry.lists_apart_s)
             self._versions[topic] = since if part is None else part.version
         elif row is topics.DETECTIONS:
             part = telemetry.part(topic, now)

@@ -4,10 +4,6 @@ A message is encoded once for all browsers.  Each browser has one task that send
 newest values; a browser that reads nothing keeps no queue and is closed after a while
 (fault F23).  Telemetry goes in frames, as fast as a browser paints them; everything
 else passes beside them at once.
-
-Messages from one browser: pings, presses, painted frames.
-
-The line to one browser: its messages, one after the other.
 """
 
 import asyncio
@@ -42,7 +38,7 @@ Stop = Callable[[str | None, Principal, Press], Awaitable[object]]
 def current_principal(
     websocket: WebSocket, principal: Principal, action: Action
 ) -> Principal | None:
-    """The same session as of now; None: it may not."""
+    """The session as of now; None: it may not."""
     authenticator: Authenticator = websocket.app.state.authenticator
     current = authenticator.current(principal)
     return current if current is not None and current.may(action) else None
@@ -238,10 +234,12 @@ def router(
                 watcher = tasks.create_task(
                     _watch(websocket, principal, line), name="live-watch"
                 )
-                ear = ClientMessages(
+                messages = ClientMessages(
                     websocket, subscriber, clock, stop, principal, feed
                 )
-                tasks.create_task(ear.listen((sender, watcher)), name="live-listen")
+                tasks.create_task(
+                    messages.listen((sender, watcher)), name="live-listen"
+                )
         except* (WebSocketDisconnect, ConnectionError) as gone:
             _log.debug("browser gone: %s", gone)
         except* Exception:

@@ -15,6 +15,7 @@ from iveg.domain.observations import (
     kind_of,
 )
 from iveg.ngsi import codec
+from iveg.vital.ingest import Ingest
 from tests.builders import (
     detection,
     detection_frame,
@@ -37,6 +38,7 @@ class Bench:
             self.offered.append,
             lambda *problem: self.rejected.append(problem),
             scope,
+            is_early=Ingest({"AGI"}.__contains__).is_early,
         )
 
 

@@ -17,12 +17,6 @@ from tests.fakes.disk import files_no_longer_than
 FORM = Form("notes", 2)
 
 
-def test_what_was_written_is_read_with_the_number_of_its_line(tmp_path: Path) -> None:
-    write_lines(tmp_path / "notes", FORM, [{"a": 1}, [2]])
-
-    assert list(read_lines(tmp_path / "notes", FORM)) == [(2, b'{"a":1}'), (3, b"[2]")]
-
-
 def test_a_file_is_its_owners_alone_and_nothing_is_left_beside_it(
     tmp_path: Path,
 ) -> None:

@@ -84,15 +84,13 @@ def test_a_missing_file_is_refused_with_the_names_that_exist() -> None:
 @pytest.mark.parametrize(
     ("right", "wrong", "said"),
     [
-        ("xmax = 9, ymax = 4", 'xmax = "9", ymax = 4', "6:25, rows[1].xmax: Input sh"),
-        ("xmin = 1, ymin = 3", "xmin = nan, ymin = 3", "6:5, rows[1].xmin: Input sho"),
-        ("ymin = 1, xmax = 9", "ymin = 7, xmax = 9", "5:3, rows[0]: ymin must be less"),
-        ('label = "Pasillo 1"\n', "", "9:1, lanes[0].label: Field required."),
-        ("xmin = 1, ymin = 3", "xmim = 1, ymin = 3", "6:5, rows[1].xmim: Extra inp"),
-        ("xmax = 9, ymax = 4", "xmax = 90, ymax = 4", "6:3, rows[1]: lies outside b"),
+        ("xmax = 9, ymax = 4", 'xmax = "9", ymax = 4', "rows[1].xmax: Input sh"),
+        ("ymin = 1, xmax = 9", "ymin = 7, xmax = 9", "rows[0]: ymin must be less"),
+        ('label = "Pasillo 1"\n', "", "lanes[0].label: Field required."),
+        ("xmax = 9, ymax = 4", "xmax = 90, ymax = 4", "rows[1]: lies outside b"),
     ],
 )
-def test_what_cannot_be_is_refused_with_file_line_and_field(
+def test_what_cannot_be_is_refused_with_file_and_field(
     right: str, wrong: str, said: str
 ) -> None:
-    assert complaint(SMALL.replace(right, wrong)).startswith(f"shed.toml:{said}")
+    assert complaint(SMALL.replace(right, wrong)).startswith(f"shed.toml, {said}")

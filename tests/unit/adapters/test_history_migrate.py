@@ -139,5 +139,21 @@ def test_nobody_else_reads_the_file_of_the_history(
         }
     engine.dispose()
 
-    names = "iveg.sqlite", "iveg.sqlite-shm", "iveg.sqlite-wal"
-    assert rights == dict.fromkeys(names, 0o600)
+    assert rights == dict.fromkeys(("iveg.sqlite", "iveg.sqlite-journal"), 0o600)
+
+
+def test_a_file_of_an_earlier_version_in_wal_is_in_it_no_longer(tmp_path: Path) -> None:
+    file = tmp_path / "iveg.sqlite"
+    with sqlite3.connect(file) as earlier:
+        earlier.execute("PRAGMA journal_mode=WAL")
+        earlier.execute("CREATE TABLE kept (row)")
+        earlier.execute("INSERT INTO kept VALUES (1)")
+        earlier.commit()
+    earlier.close()
+
+    upgrade(sqlite_url(file))
+
+    with sqlite3.connect(file) as now:
+        assert now.execute("PRAGMA journal_mode").fetchone() == ("delete",)
+        assert now.execute("SELECT row FROM kept").fetchall() == [(1,)]
+    assert [*tmp_path.glob("iveg.sqlite-*")] == []

@@ -89,11 +89,10 @@ async def test_an_agent_that_forgot_our_devices_leaves_no_entities_of_its_own(
 
 
 async def test_entities_that_an_agent_once_made_up_are_removed(site: Site) -> None:
-    group = {"apikey": "iveg", "resource": "/iot/json", "entity_type": "Robot"}
-    await site.agent.create_group({**group, "cbroker": site.up.orion_url})
-    for device in ("AGI_odom", "somebody"):
-        site.up.agent.hear(f"/iveg/{device}/attrs", b'{"v":1}')
     made_up = ["Robot:AGI_odom", "Robot:somebody"]
+    for entity_id in made_up:
+        body = {"id": entity_id, "type": "Robot"}
+        await site.orion.ask("POST", "/v2/entities", body=body)
     assert len(await site.orion.find_entities(made_up)) == 2
 
     mended = (await site.provision("AGI")).mended

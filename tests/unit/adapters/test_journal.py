@@ -30,16 +30,6 @@ async def write(path: Path, *lines: tuple[str, str]) -> FileJournal:
     return journal
 
 
-async def test_what_was_wanted_last_is_wanted_after_a_restart(tmp_path: Path) -> None:
-    path = tmp_path / "deep" / "commands.jsonl"
-    journal = await write(
-        path, ("AGI", "stopped"), ("AGII", "stopped"), ("AGII", "run")
-    )
-    journal.close()
-
-    assert FileJournal(path).read() == {"AGI": DesiredRecord("ana", "01A")}
-
-
 async def test_a_line_is_on_disk_when_the_call_returns(tmp_path: Path) -> None:
     path = tmp_path / "commands.jsonl"
     journal = await write(path, ("AGI", "stopped"))
@@ -107,21 +97,6 @@ async def test_what_a_release_has_named_is_known_and_still_wanted(
 
     assert FileJournal(path).read() == {
         "AGI": DesiredRecord("iveg", "01C", ("01A", "01B"), ("01A", "01B"), "c1")
-    }
-
-
-async def test_a_release_that_came_true_is_over_but_its_names_stay_known(
-    tmp_path: Path,
-) -> None:
-    path = tmp_path / "commands.jsonl"
-    journal = await write(path, ("AGI", "stopped"))
-    await journal.log_release("AGI", "01A", ["01A"], "c1", "ana", START)
-    await journal.log_desired("AGI", "run", None, "ana", START)
-    await journal.log_desired("AGI", "stopped", "01B", "ben", START)
-    journal.close()
-
-    assert FileJournal(path).read() == {
-        "AGI": DesiredRecord("ben", "01B", named=("01A",))
     }
 
 
@@ -315,22 +290,6 @@ async def test_on_a_full_disk_orders_are_still_written_down(tmp_path: Path) -> N
 
     assert len(left(path)) == 499
     assert FileJournal(path).read() == {"AGI": DesiredRecord("ana", "01A")}
-
-
-async def test_rows_that_the_disk_refused_are_written_with_the_next(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    path = tmp_path / "commands.jsonl"
-    path.mkdir()
-    journal = FileJournal(path)
-    await keep(journal, Waiting(command_record(), 1, 0.0))
-    path.rmdir()
-
-    await keep(journal, Waiting(command_record(), 2, 0.0))
-    journal.close()
-
-    assert left(path) == [1, 2]
-    assert "could not be written" in caplog.text
 
 
 async def test_a_write_that_is_cancelled_half_way_is_done_again(

@@ -5,7 +5,7 @@ import logging
 
 import pytest
 
-from iveg.adapters import log_filter, mqtt
+from iveg.adapters import log_filter
 from iveg.adapters.log_filter import OVER_S, LossFilter
 
 
@@ -63,23 +63,6 @@ def test_a_thousand_complaints_are_one_line_a_loss_and_one_a_return(
     assert log_filter.counted["broker.late_puback"] - before == 1000
 
 
-def test_what_comes_back_is_a_new_loss(
-    logger: logging.Logger, caplog: pytest.LogCaptureFixture
-) -> None:
-    assert logger.filters
-    loop = Clockwork()
-    full = "Message queue is full. Discarding message."
-
-    run_at(loop, 1000.0, full, full)
-    run_at(loop, 1000.0 + OVER_S)
-    run_at(loop, 1001.0 + OVER_S, full)
-    run_at(loop, 1001.0 + 2 * OVER_S)
-    loop.close()
-
-    over = "tests.floods: over after 2 times: Message queue is full. Discarding message"
-    assert said(caplog) == [full, over, full]
-
-
 def test_different_complaints_do_not_hide_each_other(
     logger: logging.Logger, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -91,10 +74,3 @@ def test_different_complaints_do_not_hide_each_other(
         "There are 11 pending publish calls.",
         "Message queue is full. Discarding message.",
     ]
-
-
-def test_the_library_that_floods_is_held_to_it() -> None:
-    assert mqtt
-    kinds = {type(one) for one in logging.getLogger("mqtt").filters}
-
-    assert LossFilter in kinds

@@ -27,16 +27,6 @@ CHANGED = DetectionRule(
 )
 
 
-async def test_a_changed_rule_outlives_a_restart(tmp_path: Path) -> None:
-    rules = FileRules(tmp_path / "rules.jsonl")
-    rules.load(FIRST, START)
-    await rules.append(CHANGED)
-
-    again = FileRules(tmp_path / "rules.jsonl").load(FIRST, START)
-
-    assert list(again) == [FIRST, CHANGED]
-
-
 async def test_changed_settings_are_a_newer_version(tmp_path: Path) -> None:
     rules = FileRules(tmp_path / "rules.jsonl")
     rules.load(FIRST, START)

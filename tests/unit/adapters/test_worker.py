@@ -2,7 +2,6 @@
 
 import asyncio
 import os
-import signal
 import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -30,11 +29,6 @@ def fail() -> None:
     raise HopError("database", "locked")
 
 
-def fall_asleep(sign: Path) -> None:
-    sign.touch()
-    signal.pause()
-
-
 def stumble() -> object:
     return lambda: None  # No other process can be sent this.
 
@@ -56,21 +50,6 @@ async def test_where_memory_runs_out_a_worker_goes_before_the_server(
     worker: Worker,
 ) -> None:
     assert await worker.run(place_in_line) == 1000 > place_in_line()
-
-
-async def test_what_a_worker_does_can_be_ended_at_once(
-    worker: Worker, tmp_path: Path
-) -> None:
-    first = await worker.run(process_id)
-    asleep = asyncio.create_task(worker.run(fall_asleep, tmp_path / "asleep"))
-    await asyncio.sleep(0)
-    until((tmp_path / "asleep").exists, "it is asleep", 10.0)
-
-    worker.interrupt()
-
-    with pytest.raises(HopError, match="ended"):
-        await asleep
-    assert await worker.run(process_id) != first
 
 
 async def test_a_worker_that_died_is_made_anew_and_ends_with_the_server(

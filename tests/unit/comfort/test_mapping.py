@@ -60,17 +60,6 @@ def test_scans_of_all_robots_make_one_costmap() -> None:
     assert knows(field.shared(), 16.0)
 
 
-def test_a_robot_believes_its_own_scans_alone() -> None:
-    field = Field()
-    field.sweep_from("AGI", 5.0)
-    field.sweep_from("AGII", 15.0)
-    field.tick()
-    field.tick()
-
-    assert knows(field.of("AGI"), 6.0)
-    assert not knows(field.of("AGI"), 16.0)
-
-
 def test_a_robot_believes_what_it_was_told_of_others_and_is_none_to_itself() -> None:
     field = Field()
     field.sweep_from("AGI", 5.0)
@@ -91,15 +80,6 @@ def test_whom_a_recording_saw_is_not_laid_over_today() -> None:
     recorded = Zone("person", "P1", "AGI", 15.0, 15.0, 2.0, 2.0, recording="D1")
 
     assert not knows(field.shared(recorded), 15.0, 15.0)
-
-
-def test_one_tick_takes_one_scan_however_many_wait() -> None:
-    field = Field()
-    field.sweep_from("AGI", 5.0)
-    field.sweep_from("AGII", 15.0)
-    field.tick()
-
-    assert knows(field.shared(), 6.0) != knows(field.shared(), 16.0)
 
 
 def test_f60_a_scan_that_cannot_be_drawn_is_refused_and_the_others_are_drawn() -> None:

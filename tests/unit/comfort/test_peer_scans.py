@@ -43,16 +43,6 @@ class Field(Scene):
         return found
 
 
-def test_while_nobody_asks_nothing_is_sent() -> None:
-    field = Field()
-    field.laser("AGI")
-    field.tell("AGI", asks=False)
-    field.tell("AGII", asks=False)
-    field.pass_s(1.0)
-
-    assert field.heard() == []
-
-
 def test_who_asks_is_told_of_its_peers_and_not_of_itself() -> None:
     field = Field()
     field.laser("AGI")

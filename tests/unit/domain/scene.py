@@ -17,11 +17,10 @@ from iveg.domain.observations import (
 )
 from iveg.domain.rule.judge import SpeedLimits
 from iveg.domain.rule.zones import LimitChange
-from iveg.domain.tracking.blind import BlindCameras
-from iveg.domain.tracking.calibration import Calibrations
+from iveg.domain.tracking.looks import Calibrations
 from iveg.domain.tracking.people import People, Placed
 from iveg.domain.tracking.person import TrackedPerson
-from iveg.domain.tracking.sight import Look, OwnSight
+from iveg.domain.tracking.sight import BlindCameras, Look, OwnSight
 from iveg.domain.world import World
 from tests.builders import (
     at,

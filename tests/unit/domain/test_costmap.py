@@ -60,13 +60,6 @@ def test_a_beam_frees_its_way_and_takes_its_end(yaw: float) -> None:
     assert cost(costmap, 8.55, 5.05) == UNKNOWN
 
 
-def test_a_beam_that_found_nothing_frees_all_its_way_and_takes_nothing() -> None:
-    costmap = seen(around(math.inf, range_max=4.0), Pose2D(5.0, 5.0, 0.0))
-
-    assert cost(costmap, 8.0, 5.0) == 0
-    assert costmap.data.max() == 0
-
-
 def test_a_return_beyond_the_range_that_counts_frees_nothing() -> None:
     costmap = seen(around(12.5, range_max=12.0), Pose2D(10.0, 5.0, 0.0))
 

@@ -26,10 +26,6 @@ def frame(*unread: str | None) -> DetectionFrame:
     return DetectionFrame("AGI", Origin(), (), unread)
 
 
-def test_a_detector_that_was_never_heard_is_missing() -> None:
-    assert DetectorEvidence().is_missing(at(0.0))
-
-
 @pytest.mark.parametrize(("age", "missing"), [(1.0, False), (1.01, True)])
 def test_a_whole_frame_proves_it_for_a_second(age: float, *, missing: bool) -> None:
     assert looked().is_missing(at(age)) is missing
@@ -88,10 +84,6 @@ def test_a_tomato_without_depth_is_none() -> None:
     assert flaw_of(frame("tomato"), DetectionRule()) is None
 
 
-def test_somebody_without_room_is_one() -> None:
-    assert flaw_of(detection_frame(), DetectionRule(), turned_away=1) == "overload"
-
-
 def seen(*class_ids: str) -> DetectionFrame:
     return detection_frame("AGI", *map(detection, class_ids))
 
@@ -109,11 +101,6 @@ def test_two_hundred_classes_of_a_robot_have_a_name_and_no_more() -> None:
 
     assert names(found) == ["thing-7", "other", "farmer", "Husky"]
     assert len(detector.class_names) == CLASS_NAMES
-
-
-def test_a_frame_of_known_classes_stays_as_it_is() -> None:
-    detector, frame = DetectorEvidence(), seen("tomato", "farmer")
-    assert detector.bounded(frame, DetectionRule()) is frame
 
 
 def test_a_frame_with_somebody_whose_place_nobody_knows_is_not_whole() -> None:

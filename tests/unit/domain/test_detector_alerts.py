@@ -45,13 +45,6 @@ def test_one_that_never_worked_has_ten_seconds_to_begin(
     assert bool(keys(driving(), 0.0, -since)) is told
 
 
-def test_a_frame_whose_age_is_not_proven_yet_is_no_loss() -> None:
-    world = driving()
-    world.robot("AGI").detector.note_whole(None)
-
-    assert keys(world, 0.0, -1.0) == []
-
-
 @pytest.mark.parametrize("now", [2.0, 4.0])
 def test_of_a_robot_that_is_late_or_lost_itself_the_detector_is_no_news(
     now: float,
@@ -60,15 +53,6 @@ def test_of_a_robot_that_is_late_or_lost_itself_the_detector_is_no_news(
     world.robot("AGI").detector.note_whole(START.mono)
 
     assert keys(world, now) == []
-
-
-def test_of_a_robot_that_stays_late_it_is() -> None:
-    world = driving()
-    world.robot("AGI").detector.note_whole(START.mono)
-    for now in (5.0, 5.9, 6.8):
-        driving(world, now)
-
-    assert keys(world, 8.3) == ["alert.detector_silent"]
 
 
 def test_of_a_robot_that_has_just_come_back_it_is_no_news_for_a_second() -> None:

@@ -34,19 +34,6 @@ def told(*values: Any) -> tuple[Equipment, list[State]]:
     return equipment, states
 
 
-@pytest.mark.parametrize(
-    ("value", "state"),
-    [
-        (0.4, "low_low"), (0.9, "low"), (1.0, "ok"), (3.5, "ok"), (3.6, "high"),
-        (5, "high_high"),
-    ],
-)  # fmt: skip
-def test_a_number_beyond_a_limit_has_the_state_of_the_gravest(
-    value: float, state: State
-) -> None:
-    assert told(value)[1] == [state]
-
-
 def test_a_limit_lets_go_only_inside_its_deadband() -> None:
     _, states = told(3.6, 3.45, 3.39, 3.45, 4.6, 4.45, 4.39)
 

@@ -71,11 +71,11 @@ def test_a_robot_without_a_count_is_read_directly_while_that_works() -> None:
 def test_scans_and_poses_have_feeds_of_their_own() -> None:
     world = World(["AGI"])
     heard(world, DIRECT.id, 1, 0.0)
-    assert world.feeds.of("AGI", Odometry).transport(START.mono) == "direct"
-    assert world.feeds.of("AGI", LaserScan).transport(START.mono) == "fiware"
+    assert world.feed("AGI", Odometry).transport(START.mono) == "direct"
+    assert world.feed("AGI", LaserScan).transport(START.mono) == "fiware"
 
 
 def test_what_was_asked_of_orion_feeds_nobody() -> None:
     world = World(["AGI"])
     world.apply(replace(received(odometry(), transport=FIWARE.id), asked=True))
-    assert world.feeds.of("AGI").fiware_at == float("-inf")
+    assert world.feed("AGI").fiware_at == float("-inf")

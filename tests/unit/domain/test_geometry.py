@@ -20,9 +20,8 @@ def test_a_point_ahead_of_a_robot_that_looks_left_is_to_the_north() -> None:
 @pytest.mark.parametrize(
     ("segment", "crosses"),
     [
-        ((0, 2, 3, 2), True), ((0, 0, 3, 0.9), False), ((1.5, 0, 1.5, 4), True),
-        ((0.5, 0, 0.5, 4), False), ((0, 2, 0.9, 2), False), ((1.5, 2, 1.6, 2.1), True),
-        ((0, 2, 2, 4), True), ((1.5, 2, 1.5, 2), True), ((0, 3.2, 3, 3.2), False),
+        ((0, 2, 3, 2), True), ((0, 0, 3, 0.9), False), ((0.5, 0, 0.5, 4), False),
+        ((1.5, 2, 1.6, 2.1), True), ((0, 2, 2, 4), True), ((0, 2, 0.9, 2), False),
     ],
 )  # fmt: skip
 def test_a_segment_crosses_a_rectangle_or_passes_it(

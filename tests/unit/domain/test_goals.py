@@ -64,20 +64,6 @@ def test_what_has_ended_stays_ended(state: GoalState, event: GoalEvent) -> None:
     assert not before.is_open
 
 
-@pytest.mark.parametrize("event", get_args(GoalEvent))
-@pytest.mark.parametrize("state", sorted(OPEN))
-def test_only_the_robots_own_word_makes_a_goal_driving_or_reached(
-    state: GoalState, event: GoalEvent
-) -> None:
-    after = goal_in(state).after(event, at(3))
-
-    if after is not goal_in(state) and after.state in ("DRIVING", "REACHED"):
-        assert (
-            event == {"DRIVING": "accepted", "REACHED": "reached"}.get(after.state)
-            or after.state == state
-        )
-
-
 def test_an_unanswered_goal_is_not_confirmed_and_a_late_word_still_counts() -> None:
     sent = goal_in("SENT")
     assert not sent.is_overdue(at(ANSWERED_WITHIN_S))
@@ -128,10 +114,6 @@ def test_an_aisle_is_a_free_place_in_it(lane: object) -> None:
     assert not isinstance(found, str)
     assert label in {one.label for one in TESTBED.lanes if one.area.contains(*found)}
     assert place("here", *found) == found
-
-
-def test_an_aisle_that_nobody_knows_is_none() -> None:
-    assert place("aisle", aisle="Pasillo 99") == "no_such_aisle"
 
 
 def test_return_and_pause_need_no_place() -> None:
@@ -197,19 +179,3 @@ def test_a_robot_that_is_held_or_unknown_gets_no_goal(
         permit(robot, stop_state, GOAL, at(after_s))
 
     assert refused.value.why == why
-
-
-def test_a_recording_gets_no_goal() -> None:
-    robot = world_with(kind="recording").robot("AGI")
-
-    with pytest.raises(CommandRefusedError, match="recording"):
-        permit(robot, "RUNNING", GOAL, at(0.2))
-
-
-def test_a_robot_in_doubt_gets_no_goal() -> None:
-    robot = world_with(POSE, FREE).robot("AGI")
-    for moment in (0.1, 0.7):
-        robot.doubts.contradicted("jumped", at(moment))
-
-    with pytest.raises(CommandRefusedError, match="contradict"):
-        permit(robot, "RUNNING", GOAL, at(0.8))

@@ -38,7 +38,7 @@ def test_the_ring_law_judges_an_array_as_it_judges_each_age() -> None:
 
 def test_nobody_can_change_a_limit() -> None:
     with pytest.raises(FrozenInstanceError):
-        LIMITS.ring_default_m = 0.1  # type: ignore[misc]
+        LIMITS.zone_default_m = 0.1  # type: ignore[misc]
 
 
 @pytest.mark.parametrize("row", fields(LIMITS), ids=lambda row: row.name)
@@ -52,7 +52,7 @@ def test_every_limit_has_a_unit_a_source_and_a_meaning(row: Field[Any]) -> None:
 def test_rule_robot_and_settings_begin_with_the_limits() -> None:
     settings, robot = Settings(), Limits()
 
-    assert settings.rule.radius_m == ByClass(LIMITS.ring_default_m)
+    assert settings.rule.radius_m == ByClass(LIMITS.zone_default_m)
     assert DetectionRule.of(settings.rule) == DetectionRule()
     assert settings.feedback_stand_s == robot.stand_s == LIMITS.feedback_stand_s
     assert settings.feedback_slow_s == robot.slow_s == LIMITS.feedback_slow_s

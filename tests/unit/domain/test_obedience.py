@@ -86,22 +86,9 @@ def test_a_limit_whose_cause_changes_goes_on() -> None:
     assert found[0] == "alert.person_not_slowing"
 
 
-def test_another_reason_has_another_name() -> None:
-    assert set(Watched().drive(4.0, STALE)) == {"alert.no_slow_down"}
-
-
 @pytest.mark.parametrize("speed", [0.0, 0.3, 0.5])
 def test_a_robot_that_is_slow_or_stands_is_never_disobedient(speed: float) -> None:
     assert Watched().drive(20.0, PERSON, speed=speed) == []
-
-
-def test_a_robot_that_is_let_go_may_drive_and_is_told_anew() -> None:
-    watched = Watched()
-    watched.drive(1.0, PERSON)
-
-    found = watched.drive(0.2, CLEAR) + watched.drive(1.2, PERSON)
-
-    assert found == []
 
 
 def test_a_moment_of_speed_is_no_disobedience() -> None:

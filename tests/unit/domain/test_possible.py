@@ -26,27 +26,6 @@ def looked(
         scene.look("AGI", person(x, probability=chance))
 
 
-def test_where_the_rule_says_so_only_single_boxes_count() -> None:
-    scene = Scene(rule=OFF)
-    looked(scene, 0.79, 0.79, 0.79, 0.79)
-
-    assert scene.everyone == []
-
-
-def test_two_looks_that_come_to_the_threshold_are_a_person_and_say_why() -> None:
-    scene = Scene(rule=ON)
-    looked(scene, 0.7)
-    assert scene.everyone == []
-
-    looked(scene, 0.7)
-
-    (somebody,) = scene.everyone
-    looks = somebody.newest.looks
-    assert looks is not None
-    assert (looks.count, looks.least, looks.most, looks.over_s) == (2, 0.7, 0.7, 0.3)
-    assert looks.probability == pytest.approx(0.845, abs=0.001)
-
-
 @pytest.mark.parametrize(
     ("chances", "every_s"),
     [
@@ -93,13 +72,6 @@ def test_where_a_weak_box_stands_no_sure_ring_is_cleared() -> None:
 
     (somebody,) = scene.everyone
     assert {one.possible for one in somebody.sightings} == {False, True}
-
-
-def test_a_possible_person_slows_like_any_other() -> None:
-    scene = Scene(rule=ON)
-    looked(scene, 0.7, 0.7, 0.7, x=1.5)
-
-    assert scene.judge()["AGI"].reason == "person"
 
 
 # --- beyond the walls -------------------------------------------------------------

@@ -69,11 +69,6 @@ def test_a_doubt_that_is_told_first_has_the_colour_of_what_is_graver() -> None:
     assert situation_of(replace(stale, alerts=())).level == "doubt"
 
 
-def test_half_speed_is_said_of_nobody_who_is_faster() -> None:
-    assert situation_of(facts(**PERSON)).state == "half"
-    assert situation_of(facts(**PERSON, is_slow=False)).state == "told"
-
-
 @pytest.mark.parametrize("reason", ["stale", "person"])
 def test_a_robot_without_a_camera_is_never_clear(reason: str) -> None:
     limit = SpeedLimit(0.5, reason)

@@ -125,15 +125,6 @@ def test_a_report_that_lacks_our_hold_is_no_release_unless_it_says_so() -> None:
     assert bench.state == "RELEASING"
 
 
-def test_the_answer_released_is_noted_and_decides_nothing() -> None:
-    bench = releasing()
-
-    bench.answer("RELEASED")
-
-    assert bench.state == "RELEASING"
-    assert bench.once.times.answered[DIRECT.id] == at(bench.now)
-
-
 def test_a_refused_release_leaves_the_robot_standing_and_says_why() -> None:
     bench = releasing()
     bench.answer("REFUSED", why="not_standing", attempt=bench.attempt)
@@ -195,18 +186,6 @@ def test_an_unconfirmed_release_keeps_the_hold_that_a_later_report_shows() -> No
     assert bench.machine.stop is not before
 
 
-def test_an_unconfirmed_release_of_a_lost_name_keeps_what_is_held_in_its_place() -> (
-    None
-):
-    bench = releasing()
-    other = Hold("01OTHER", "iveg", "remote")
-    bench.report(other, challenge=NEXT_CHALLENGE)
-
-    bench.wait(2.05)
-
-    assert bench.machine.hold_id == "01OTHER"
-
-
 def test_a_press_during_a_release_of_three_adds_no_fourth() -> None:
     bench = of_three()
 
@@ -240,16 +219,6 @@ def test_a_hold_in_doubt_is_replaced_when_the_robot_says_nothing_for_a_second() 
 
     assert bench.machine.hold_id not in {hold.id for hold in THREE}
     assert {one.hold_id for one in sends(effects)} >= {bench.machine.hold_id}
-
-
-def test_a_hold_in_doubt_is_certain_once_the_challenge_has_changed() -> None:
-    bench = of_three()
-    bench.press("ben")
-    bench.report(*THREE, challenge=NEXT_CHALLENGE)
-
-    bench.wait(5.0)
-
-    assert bench.machine.hold_id == THREE[-1].id
 
 
 THREE = tuple(Hold(f"01HELD{n}", "iveg", "remote") for n in range(3))
@@ -335,25 +304,6 @@ def test_such_a_release_that_is_refused_ends_where_it_began() -> None:
 # --- READY, RUNNING ---------------------------------------------------------------
 
 
-def test_a_ready_robot_that_drives_runs_and_the_episode_is_over() -> None:
-    bench = Bench().ready()
-
-    bench.report(factor=1.0, linear=0.3, released=("id-1",))
-
-    assert bench.state == "RUNNING"
-    assert bench.machine.stop is None
-
-
-def test_a_resume_is_sent_once_without_ids() -> None:
-    bench = Bench().ready()
-
-    effects = bench.resume() + bench.wait(1.5)
-
-    (sent,) = once(effects)
-    assert (sent.attempt.command.kind, sent.attempt.ids) == ("resume", ())
-    assert bench.state == "RELEASING"
-
-
 def test_a_resume_is_done_when_the_robot_reports_that_it_may_drive() -> None:
     bench = Bench().ready()
     bench.resume()
@@ -363,17 +313,6 @@ def test_a_resume_is_done_when_the_robot_reports_that_it_may_drive() -> None:
     bench.report(factor=0.5)
 
     assert bench.state == "RUNNING"
-
-
-def test_a_resume_that_is_refused_leaves_the_robot_ready() -> None:
-    bench = Bench().ready()
-    bench.resume()
-
-    bench.answer("REFUSED", why="challenge", attempt=bench.attempt)
-    assert bench.state == "RELEASING"
-    bench.report(challenge=NEXT_CHALLENGE)
-
-    assert bench.state == "READY"
 
 
 def test_a_held_robot_cannot_be_resumed() -> None:
@@ -397,23 +336,6 @@ def test_a_hold_of_iveg_that_nobody_here_asked_for_is_adopted(state: str) -> Non
     assert not once(effects)
     bench.stand()
     assert bench.state == "STANDING"
-
-
-@pytest.mark.parametrize(("direct", "transport"), [(True, "direct"), (False, "fiware")])
-def test_an_adopted_hold_is_sent_like_any_other_that_the_robot_has(
-    direct: bool, transport: str
-) -> None:
-    bench = Bench(direct=direct).ready()
-    bench.press()  # its FIWARE request is on its way for ever
-    bench.stand()
-    ours = bench.ours.id
-    bench.release(ours)
-    bench.report(released=(ours,))
-    bench.report(Hold("01FROMBEFORE", "iveg", "remote"), linear=0.3)
-
-    effects = bench.wait(0.1)
-
-    assert {one.transport for one in sends(effects)} == {transport}
 
 
 def test_an_adopted_hold_ends_when_the_robot_says_that_another_server_released_it() -> (

@@ -160,7 +160,7 @@ def test_numbers_begin_anew_each_day_and_ids_never_come_again() -> None:
         now = at(after)
         seen = Sighting("AGI", x, 0.0, 0.9, now, "farmer", 0.94)
         tracker.forget(now)
-        ids += tracker.track_picture([PlacedDetection("person", seen, "d")], now)
+        ids += tracker.track_picture([PlacedDetection("person", seen, "d", 0)], now)
 
     assert [str(one).partition("-")[0] for one in ids] == ["P1", "P2", "P3", "P1"]
     assert len(set(ids)) == 4
@@ -216,8 +216,9 @@ def test_the_union_of_rings_is_the_same_with_and_without_merging(
                         "person",
                         Sighting(observer, x, y, 0.9, now, "farmer", 0.9),
                         f"d{number}",
+                        index,
                     )
-                    for x, y in places
+                    for index, (x, y) in enumerate(places)
                 ],
                 now,
             )

@@ -54,14 +54,6 @@ def asked(observation: Observation, after: float = 0.0) -> Received:
 # --- links ------------------------------------------------------------------------
 
 
-def test_a_robot_that_was_never_heard_is_unknown() -> None:
-    robot = world_with().robot("AGI")
-
-    assert robot.link(at(0.0)) == "UNKNOWN"
-    assert robot.age_s(at(0.0)) is None
-    assert not robot.stands
-
-
 @pytest.mark.parametrize(
     ("age", "link"),
     [
@@ -267,13 +259,6 @@ def test_what_fiware_alone_brings_is_no_younger_than_the_lag_of_our_probe() -> N
     assert robot.estimated_since == START.mono
 
 
-def test_before_our_first_probe_came_back_nobody_knows_what_fiware_brings() -> None:
-    world = world_behind()
-    world.apply(received(odometry()))
-
-    assert world.robot("AGI").link(at(0.0)) == "UNKNOWN"
-
-
 def test_an_estimate_proves_nothing_of_odometry() -> None:
     world = world_with(odometry())
 
@@ -390,19 +375,6 @@ PLAYED = replace(origin(), replay="AGI")
 def recording() -> World:
     """AGI is a recording, AGII is live."""
     return World(fleet_of("AGI:recording", "AGII"))
-
-
-def test_a_recording_is_one_because_the_fleet_says_so() -> None:
-    world = recording()
-
-    assert world.robot("AGI").is_replay
-    assert [robot.robot_id for robot in world.live_robots()] == ["AGII"]
-
-
-def test_what_a_robot_calls_its_task_makes_it_no_recording() -> None:
-    world = world_with(Navigation("AGI", origin(), "replay"))
-
-    assert not world.robot("AGI").is_replay
 
 
 @pytest.mark.parametrize(

@@ -57,16 +57,6 @@ def at(found: InflatedGrid, x: float, y: float) -> int:
     return int(found.data[found.grid.index(x, y)])
 
 
-def test_what_a_peer_met_is_lethal_and_what_it_saw_through_is_free() -> None:
-    one = costmap()
-    one.hear(TOPIC, payload(), HERE)
-    found = drawn(one)
-
-    assert at(found, 12.95, 10.05) == 100
-    assert at(found, 11.5, 10.05) == 0
-    assert at(found, 15.0, 10.0) == -1
-
-
 def test_a_body_is_lethal_and_its_ring_is_dear_towards_the_centre() -> None:
     found = drawn(costmap(), PERSON)
 
@@ -138,14 +128,6 @@ def test_a_bad_scan_is_ignored_counted_and_logged_once(
 
     one.hear(TOPIC, payload(), HERE)
     assert at(drawn(one), 12.95, 10.05) == 100
-
-
-def test_a_robot_that_knows_no_place_takes_no_scan() -> None:
-    one = costmap()
-    one.hear(TOPIC, payload(), None)
-    one.hear("/AGI/iveg/peer_scan", payload().replace(b"AGII", b"AGI"), HERE)
-
-    assert one.drain_scans() == []
 
 
 def test_a_clock_of_iveg_that_is_set_is_followed() -> None:

@@ -22,13 +22,6 @@ from tests.unit.robot.rig import person
 # --- watchdog ---------------------------------------------------------------------
 
 
-def test_age_counts_from_when_the_seen_report_was_sent() -> None:
-    watchdog = Watchdog(0.0, 1.0)
-    watchdog.sent(7, 10.0)
-    watchdog.heard(7, 10.4)
-    assert watchdog.age(10.5) == 0.5
-
-
 def test_a_repeated_number_does_not_make_it_younger_nor_an_older_one_older() -> None:
     watchdog = Watchdog(0.0, 1.0)
     watchdog.sent(7, 10.0)
@@ -39,14 +32,6 @@ def test_a_repeated_number_does_not_make_it_younger_nor_an_older_one_older() -> 
     assert watchdog.age(12.5) == 2.0
 
 
-def test_what_was_never_sent_is_no_evidence() -> None:
-    watchdog = Watchdog(3.0, 1.0)
-    watchdog.heard(None, 4.0)
-    watchdog.heard(99, 4.0)
-    assert watchdog.age(5.0) is None
-    assert watchdog.silence(5.0) == 2.0
-
-
 def feed(watchdog: Watchdog, start: float, count: int, every: float) -> float:
     now = start
     for number in range(count):
@@ -54,32 +39,6 @@ def feed(watchdog: Watchdog, start: float, count: int, every: float) -> float:
         watchdog.sent(int(now * 100), now)
         watchdog.heard(int(now * 100), now)
     return now
-
-
-def test_steady_is_two_seconds_and_four_messages() -> None:
-    watchdog = Watchdog(0.0, 1.0)
-    feed(watchdog, 0.0, 3, 0.9)
-    assert not watchdog.steady(2.5)
-    feed(watchdog, 2.6, 1, 0.1)
-    assert watchdog.steady(2.6)
-
-
-def test_an_interruption_starts_steadiness_anew() -> None:
-    watchdog = Watchdog(0.0, 1.0)
-    feed(watchdog, 0.0, 10, 0.2)
-    feed(watchdog, 4.0, 9, 0.2)
-    assert not watchdog.steady(5.9)
-    feed(watchdog, 5.8, 2, 0.2)
-    assert watchdog.steady(6.05)
-
-
-def test_three_clears_a_minute_are_allowed() -> None:
-    watchdog = Watchdog(0.0, 1.0)
-    for at in (0.0, 10.0, 20.0):
-        assert watchdog.may_clear(at)
-        watchdog.cleared(at)
-    assert not watchdog.may_clear(59.0)
-    assert watchdog.may_clear(61.0)
 
 
 # --- peer feedback ----------------------------------------------------------------
@@ -153,12 +112,6 @@ def test_a_person_without_position_is_where_the_observer_is() -> None:
     assert bench.cap(0.0, Pose2D(8.0, 0.0, 0.0)).reason == "person"
 
 
-def test_a_person_without_any_position_is_near() -> None:
-    bench = Bench()
-    bench.tell(0.0, FeedbackAlert("d-1", "", "person"))
-    assert bench.cap(0.0).factor == 0.5
-
-
 def test_a_person_missing_from_a_message_stays_until_the_topic_has_moved_on() -> None:
     bench = Bench()
     bench.tell(0.0, person(1.0))
@@ -192,24 +145,11 @@ def test_the_ring_of_a_silent_topic_grows_up_to_six_metres() -> None:
     assert bench.cap(9.0) == FREE
 
 
-def test_a_person_who_walks_leaves_no_ring_behind() -> None:
-    bench = Bench()
-    bench.tell(0.0, person(1.0))
-    bench.tell(0.2, person(3.0))
-    assert bench.cap(0.2) == FREE
-
-
 def test_a_speed_limit_lasts_while_its_topic_is_silent_and_no_longer_than_ten() -> None:
     bench = Bench()
     bench.tell(0.0, speed_limit=SpeedLimit(0.5, "stale"))
     assert bench.cap(9.9) == Cap(0.5, "stale")
     assert bench.cap(10.1) == FREE
-
-
-def test_a_speed_limit_with_an_unheard_of_reason_is_told_as_stale() -> None:
-    bench = Bench()
-    bench.tell(0.0, speed_limit=SpeedLimit(0.5, "fog"))
-    assert bench.cap(0.0).reason == "stale"
 
 
 def test_a_flood_of_topics_does_not_grow_without_end() -> None:
@@ -383,21 +323,6 @@ class AuthorsBench:
         return lowest(self.authors.caps(AT_THE_ROW, False, at)).factor
 
 
-def test_an_author_is_as_old_as_our_report_that_it_has_seen() -> None:
-    bench = AuthorsBench()
-    bench.tell(0.0)
-    bench.tell(1.5, seen_at=0.4)
-    assert bench.factor(1.5) == 0.5
-    bench.tell(1.6, seen_at=0.7)
-    assert bench.factor(1.6) == 1.0
-
-
-def test_an_author_that_has_seen_no_report_of_ours_is_silent() -> None:
-    bench = AuthorsBench()
-    bench.tell(0.0, seen_at=None)
-    assert bench.factor(0.0) == 0.5
-
-
 @pytest.mark.parametrize(
     "stray",
     [Origin("stray", 7), Origin("iveg", 2**53), Origin("iveg", 103), Origin("iveg", 1)],
@@ -411,25 +336,6 @@ def test_no_stray_message_makes_a_robot_drop_what_iveg_says_next(stray: Origin) 
         assert bench.tell(0.1 * step)
     assert bench.tell(1.5, limit=SLOW)
     assert bench.factor(1.5) == 0.5
-
-
-def test_a_stray_message_that_asks_for_standstill_is_half_speed_after_a_second() -> (
-    None
-):
-    bench = AuthorsBench()
-    bench.tell(0.0, origin=Origin("stray", 7), limit=SpeedLimit(0.0, "person"))
-    bench.go_on(0.2, 1.2)
-    assert [bench.factor(at) for at in (0.9, 1.1)] == [0.0, 0.5]
-
-
-def test_whoever_is_told_by_an_author_that_fell_silent_stays_for_ten_seconds() -> None:
-    bench = AuthorsBench()
-    bench.tell(0.0, person(1.0), origin=Origin("other", 1))
-    bench.go_on(0.2, 9.8)
-    found = {cap.reason for cap in bench.authors.caps(AT_THE_ROW, False, 9.8)}
-    assert "person" in found
-    bench.go_on(10.0, 10.4)
-    assert bench.factor(10.4) == 1.0
 
 
 def test_a_copy_is_no_news() -> None:

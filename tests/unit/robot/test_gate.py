@@ -8,7 +8,7 @@ from iveg.domain.feedback import FeedbackAlert
 from iveg.domain.fleet import CAUTIOUS
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.rule.paths import slows_within_s
-from iveg.robot.gate import FREE, AppliedCap, Cap, Gate, lowest, quantised
+from iveg.robot.gate import FREE, AppliedCap, Cap, Gate, lowest
 from tests.unit.robot.rig import STEP_S, Rig, person
 
 # --- caps -------------------------------------------------------------------------
@@ -29,25 +29,10 @@ def test_at_equal_factors_a_person_is_told_first_and_one_with_a_name() -> None:
     assert told == HALF
 
 
-def test_factors_go_down_to_the_next_step() -> None:
-    factors = [quantised(one) for one in (-1.0, 0.0, 0.49, 0.5, 0.99, 1.0, 2.0)]
-    assert factors == [0.0, 0.0, 0.0, 0.5, 0.5, 1.0, 1.0]
-
-
-def test_a_lower_cap_counts_at_once() -> None:
-    assert AppliedCap(FREE).settle(HALF, 5.0).cap == HALF
-
-
 def test_a_higher_cap_waits_a_second() -> None:
     applied = AppliedCap(HALF).settle(FREE, 5.0).settle(FREE, 5.95)
     assert applied.cap == HALF
     assert applied.settle(FREE, 6.0).cap == FREE
-
-
-def test_one_relapse_starts_the_second_anew() -> None:
-    applied = AppliedCap(HALF).settle(FREE, 5.0).settle(HALF, 5.9).settle(FREE, 6.0)
-    assert applied.settle(FREE, 6.9).cap == HALF
-    assert applied.settle(FREE, 7.0).cap == FREE
 
 
 def test_the_same_factor_with_another_reason_is_told_at_once() -> None:
@@ -90,18 +75,6 @@ def test_it_is_slow_at_the_ring_and_names_the_person() -> None:
     assert rig.machine.cap.decision_id == "d-1"
 
 
-@pytest.mark.parametrize(
-    ("alert", "foresight"),
-    [(person(6.5, velocity=STILL), False), (person(6.5), True)],
-    ids=["the rule does not", "nobody knows how they go on"],
-)
-def test_without_a_forecast_the_ring_counts_as_before(
-    alert: FeedbackAlert, foresight: bool
-) -> None:
-    x = slowed_at(driving(alert, foresight=foresight))
-    assert x == pytest.approx(4.5, abs=0.06)
-
-
 def test_it_needs_no_network_while_what_it_was_told_is_young() -> None:
     rig = driving(person(4.0, velocity=STILL), speed=0.3)
     assert rig.factor == 1.0
@@ -111,13 +84,6 @@ def test_it_needs_no_network_while_what_it_was_told_is_young() -> None:
     rig.pose = Pose2D(1.4, 0.0, 0.0)
     rig.run(0.3)
     assert (rig.factor, rig.reason) == (0.5, "person")
-
-
-def test_a_robot_without_a_place_foresees_nothing_and_stands() -> None:
-    rig = driving(person(6.5, velocity=STILL))
-    rig.odometry = False
-    rig.run(1.0)
-    assert (rig.factor, rig.reason) == (0.0, "stale")
 
 
 # --- gate -------------------------------------------------------------------------
@@ -147,13 +113,6 @@ def test_speed_grows_by_half_a_metre_per_second_squared_and_keeps_the_curve() ->
     out = reach(open_gate(), FORWARD, 1.0, 2.0)
     assert out.linear_x == pytest.approx(0.5, abs=0.03)
     assert out.angular_z == pytest.approx(out.linear_x / 2)
-
-
-def test_a_lower_factor_counts_at_once_forward_reverse_and_turning() -> None:
-    gate = open_gate()
-    assert reach(gate, Twist2D(-1.0, -0.5), 1.0, 4.0) == Twist2D(-1.0, -0.5)
-    assert gate.output(0.5, True, 4.05) == Twist2D(-0.5, -0.25)
-    assert gate.output(0.0, True, 4.1) == REST
 
 
 def test_a_change_of_direction_starts_from_rest() -> None:
@@ -200,14 +159,6 @@ def test_the_neutral_interlock_starts_anew_with_every_wish_to_move() -> None:
     assert gate.neutral_needed
     gate.output(1.0, True, 0.96)
     assert not gate.neutral_needed
-
-
-def test_rest_while_held_does_not_count_for_the_interlock() -> None:
-    gate = Gate(1.0, 1.0)
-    for tick in range(40):
-        gate.output(1.0, False, tick / 20)
-    gate.output(1.0, True, 2.0)
-    assert gate.neutral_needed
 
 
 def test_a_held_gate_gives_zero_whatever_is_wished() -> None:

@@ -70,26 +70,6 @@ def test_a_goal_is_refused_and_navigation_hears_nothing(why: str, facts: Facts) 
     assert robot.goals.goal is None
 
 
-def test_a_goal_without_a_way_is_refused() -> None:
-    robot = Robot(knows_a_way=False)
-
-    assert robot.take(ORDER) == ["01G REFUSED no_way"]
-    assert robot.goals.goal is None
-
-
-@pytest.mark.parametrize("facts", [FREE, THERE])
-def test_a_hold_makes_it_forget_even_a_goal_that_it_has_reached(facts: Facts) -> None:
-    robot = Robot()
-    robot.take(ORDER)
-    robot.settle(facts)
-
-    assert robot.settle(replace(facts, runs=False)) == ["01G DROPPED held"]
-
-    assert robot.told[-1] is None
-    assert robot.goals.goal is None
-    assert robot.settle(replace(facts, runs=False)) == []
-
-
 def test_a_cancellation_that_overtakes_its_goal_wins() -> None:
     robot = Robot()
 
@@ -105,15 +85,6 @@ def test_a_new_goal_takes_the_place_of_the_old_one() -> None:
 
     assert robot.take(other) == ["01G DROPPED replaced", "01H ACCEPTED"]
     assert robot.goals.goal == other.goal
-
-
-def test_a_refused_goal_leaves_the_one_before() -> None:
-    robot = Robot()
-    robot.take(ORDER)
-    late = replace(ORDER, goal=replace(GOAL, goal_id="01H"), until_s=1.0)
-
-    assert robot.take(late) == ["01H REFUSED too_late"]
-    assert robot.goals.goal == GOAL
 
 
 # --- the wire ---------------------------------------------------------------------
@@ -149,8 +120,3 @@ assert isinstance(SET, dict)
 )
 def test_anything_else_is_left_to_the_reader_of_stop(message: object) -> None:
     assert read_goal(orjson.dumps(message)) is None
-
-
-@pytest.mark.parametrize("junk", [b"", b"{", b'{"goal": {"set": {"x": NaN}}}', b"STOP"])
-def test_bytes_that_are_no_json_are_no_goal(junk: bytes) -> None:
-    assert read_goal(junk) is None

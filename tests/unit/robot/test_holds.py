@@ -13,25 +13,6 @@ LINK = Hold("link-1", "link", "auto")
 SET = HoldSet((STOP, BUTTON, LINK), ("old-1", "old-2"), ("01J",))
 
 
-def test_only_remote_holds_must_be_named() -> None:
-    assert SET.remote == {"01A"}
-
-
-def test_a_link_hold_that_is_joined_becomes_remote() -> None:
-    alone = HoldSet().latch(LINK)
-    assert alone.link_alone == LINK
-    joined = alone.latch(BUTTON)
-    assert joined.link_alone is None
-    assert joined.remote == {"link-1"}
-
-
-def test_what_is_lifted_is_remembered_and_what_was_not_held_is_not() -> None:
-    lifted = SET.lift(["01A", "never"])
-    assert lifted.holds == (BUTTON, LINK)
-    assert lifted.released == ("old-1", "old-2", "01J", "01A")
-    assert lifted.joined == ()
-
-
 def test_the_last_64_released_ids_are_kept() -> None:
     holds = HoldSet()
     for number in range(100):
@@ -53,10 +34,6 @@ def test_a_file_gives_back_what_was_written(tmp_path: Path) -> None:
     assert [one.name for one in file.parent.iterdir()] == ["AGI.json"]
 
 
-def test_before_the_first_start_there_is_nothing(tmp_path: Path) -> None:
-    assert read_holds(tmp_path / "none.json") == HoldSet()
-
-
 @pytest.mark.parametrize(
     "content",
     [
@@ -74,10 +51,6 @@ def test_a_file_that_cannot_be_read_is_not_an_empty_one(
     file = tmp_path / "AGI.json"
     file.write_bytes(content)
     assert read_holds(file) is None
-
-
-def test_a_folder_in_its_place_is_unreadable(tmp_path: Path) -> None:
-    assert read_holds(tmp_path) is None
 
 
 def test_a_write_that_fails_leaves_the_old_set(tmp_path: Path) -> None:

@@ -26,11 +26,6 @@ def measures(rates: UplinkRates, suffix: str, seconds: float = 10.0) -> list[flo
     return [now for now in ticks if rates.is_measure(suffix, now)]
 
 
-@pytest.mark.parametrize("suffix", [*KINDS, "_nav", ""])
-def test_without_a_backlog_every_message_is_a_measure(suffix: str) -> None:
-    assert len(measures(UplinkRates(), suffix)) == 300
-
-
 @pytest.mark.parametrize(
     ("level", "rates_hz"),
     [
@@ -73,21 +68,6 @@ def test_news_is_a_measure_at_any_level() -> None:
     measures(rates, "_yolox_bounding_boxes", 1.0)
     assert rates.is_measure("_yolox_bounding_boxes", 1.0, news=True)
     assert rates.is_measure("_yolox_bounding_boxes", 1.001, news=True)
-
-
-@pytest.mark.parametrize("backlog_s", [None, 0.0, 0.49])
-def test_no_news_and_good_news_lower_nothing(backlog_s: float | None) -> None:
-    rates = UplinkRates()
-    told_for(rates, backlog_s, 60.0, 0.0)
-    assert rates.level == 0.0
-
-
-def test_silence_of_iveg_changes_nothing() -> None:
-    rates = UplinkRates()
-    now = told_for(rates, 5.0, 2.0, 0.0)
-    level = rates.level
-    rates.note_backlog(5.0, now + 3600.0)
-    assert rates.level - level <= 0.5
 
 
 def test_a_backlog_is_answered_within_seconds_and_forgiven_slowly() -> None:

@@ -24,15 +24,13 @@ from iveg.domain.observations import (
     Navigation,
     Odometry,
     Origin,
-    RobotFault,
     SafetyReport,
     Unplaced,
 )
-from iveg.ngsi import codec, names
+from iveg.ngsi import codec
 from iveg.robot.gate import Cap
 from iveg.robot.holds import HoldSet
-from iveg.robot.orders import Report
-from iveg.robot.uplink import LEVELS, LaneMessage, SafetyLane, Uplink
+from iveg.robot.uplink import LEVELS, LaneMessage, Origins, SafetyLane, Uplink
 from tests.builders import START, detection, detection_frame, odometry, scan
 from tests.unit.robot.rig import AHEAD, REST, Rig, stop
 
@@ -107,18 +105,6 @@ async def test_an_answer_waits_for_the_disk() -> None:
         world.disk_ready.set()
         await world.until_seen(3)
     assert world.seen == [b"report", FIRST, b"answer"]
-
-
-async def test_of_several_sets_the_newest_is_kept_and_every_answer_sent() -> None:
-    world = World()
-    lane = world.lane
-    lane.persist(FIRST)
-    lane.answer(message("1"))
-    lane.persist(SECOND)
-    lane.answer(message("2"))
-    async with world.running():
-        await world.until_seen(3)
-    assert world.seen == [SECOND, b"1", b"2"]
 
 
 async def test_a_full_disk_is_told_once_and_does_not_silence_the_robot(
@@ -197,11 +183,13 @@ class Wire:
         self.uplink = Uplink(
             "AGI",
             "iveg",
-            "boot-a",
+            Origins(
+                "boot-a",
+                700,
+                echoes=None if heard is None else lambda: tuple(heard),
+            ),
             lambda topic, payload: self.sent.append((topic, payload)),
             form="single" if form == "single" else "per-topic",
-            first_report=700,
-            echoes=None if heard is None else lambda: tuple(heard),
         )
 
     def read(self) -> list[object]:
@@ -239,23 +227,6 @@ def test_each_sensor_has_its_topic_and_each_message_its_origin(
         "boot-a", 1, "2023-11-14T22:13:20.000Z", AT.wall, AT.mono
     )
     assert second.origin.seq == 2
-
-
-def test_a_report_tells_its_place_in_the_count() -> None:
-    wire = Wire()
-    seqs = []
-    for _ in range(2):
-        seq, (direct, measure) = wire.uplink.report(
-            SafetyReport("AGI", BLANK, 0.5, "person"), AT
-        )
-        seqs.append(seq)
-        (said,) = codec.read_measure("AGI_safety", measure.payload).observations
-        assert isinstance(said, SafetyReport)
-        assert said.origin.seq == seq
-        assert direct.payload == measure.payload
-    assert seqs == [700, 701]
-    assert direct.topic == "/AGI/iveg/safety"
-    assert measure.topic == "/iveg/AGI_safety/attrs"
 
 
 def test_a_report_for_iveg_alone_goes_past_the_agent_in_the_same_count() -> None:
@@ -296,17 +267,6 @@ def test_every_message_tells_what_had_been_heard_when_it_was_measured(
     assert {(one.acknowledgements, one.echoes) for one in others} == {
         (True, (FeedbackRef("iveg", 41), FeedbackRef("other", 7)))
     }
-
-
-def test_a_report_tells_what_had_been_heard() -> None:
-    _, (_, message) = Wire(heard=[FeedbackRef("iveg", 41)]).uplink.report(
-        SafetyReport("AGI", BLANK, 1.0, "clear"), AT
-    )
-
-    (said,) = codec.read_measure("AGI_safety", message.payload).observations
-
-    assert isinstance(said, SafetyReport)
-    assert (said.origin.heard, said.origin.mono) == (FeedbackRef("iveg", 41), AT.mono)
 
 
 def test_a_recording_proves_nothing() -> None:
@@ -419,15 +379,6 @@ def test_iveg_reads_pose_scan_and_detection_from_the_single_payload() -> None:
     assert looked.detections[0].box.centre[:2] == pytest.approx((3.0, 4.0))
 
 
-def test_a_detection_in_base_link_travels_in_map() -> None:
-    wire = Wire("single")
-    ahead = replace(detection(x=2.0), frame_id="base_link")
-    wire.uplink.send(detection_frame("AGI", ahead, origin=BLANK), AT)
-    wire.uplink.send(odometry(x=5.0, y=5.0, yaw=np.pi / 2, origin=BLANK), AT)
-    position = orjson.loads(wire.sent[0][1])["position_3D"]
-    assert (position["x"], position["y"]) == pytest.approx((5.0, 7.0))
-
-
 def test_several_detections_of_one_look_take_turns_surest_first() -> None:
     wire = Wire("single")
     look = detection_frame(
@@ -450,23 +401,14 @@ UNREAD = ("farmer", None)
 
 def sent(observation: Unplaced | DetectionFrame) -> tuple[str, bytes]:
     wire: list[tuple[str, bytes]] = []
-    uplink = Uplink("AGI", "iveg", "b", lambda topic, raw: wire.append((topic, raw)))
+    uplink = Uplink(
+        "AGI", "iveg", Origins("b"), lambda topic, raw: wire.append((topic, raw))
+    )
     uplink.send(observation, START)
     return wire[0]
 
 
 # --- what is sent -------------------------------------------------------------------
-
-
-def test_odometry_without_a_place_carries_its_speed_and_no_number_for_a_place() -> None:
-    topic, payload = sent(Unplaced("", Origin(), "odometry", Twist2D(0.4, 0.1)))
-
-    value = orjson.loads(payload)[names.ODOMETRY]
-
-    assert topic == "/iveg/AGI_odom/attrs"
-    assert (value["x"], value["y"], value["yaw"]) == (None, None, None)
-    assert (value["linear_velocity"], value["angular_velocity"]) == (0.4, 0.1)
-    assert (value["frame_id"], value["seq"]) == ("unplaced", 1)
 
 
 @pytest.mark.parametrize(
@@ -484,19 +426,11 @@ def test_iveg_counts_what_has_no_place_and_places_nothing(
     assert [problem.reason for problem in reading.problems] == ["unplaced"]
 
 
-def test_whoever_was_seen_without_a_place_is_unreadable_to_iveg() -> None:
-    """An unreadable detection slows the fleet; an empty frame would not."""
-    _, payload = sent(DetectionFrame("", Origin(), (detection("farmer", 1.0),), UNREAD))
-
-    (frame,) = codec.read_measure("AGI_yolox_bounding_boxes", payload).observations
-
-    assert isinstance(frame, DetectionFrame)
-    assert (len(frame.detections), frame.unread) == (1, UNREAD)
-
-
 def test_the_single_payload_does_not_call_them_an_empty_look() -> None:
     wire: list[bytes] = []
-    uplink = Uplink("AGI", "iveg", "b", lambda _, raw: wire.append(raw), form="single")
+    uplink = Uplink(
+        "AGI", "iveg", Origins("b"), lambda _, raw: wire.append(raw), form="single"
+    )
 
     uplink.send(DetectionFrame("", Origin(), (), UNREAD), START)
     uplink.send(odometry(), START)
@@ -505,30 +439,7 @@ def test_the_single_payload_does_not_call_them_an_empty_look() -> None:
     assert [one.unread for one in found if isinstance(one, DetectionFrame)] == [UNREAD]
 
 
-def test_faults_come_back_as_they_were_reported() -> None:
-    faults = (RobotFault("no_transform", "map → odom", 2.1), RobotFault("flood", "/tf"))
-    report = SafetyReport("AGI", Origin("b", 1), 0.0, "stale", faults=faults)
-
-    (read,) = codec.read_measure("AGI_safety", codec.write_safety(report)).observations
-
-    assert isinstance(read, SafetyReport)
-    assert read.faults == faults
-
-
 # --- how it drives ------------------------------------------------------------------
-
-
-def test_a_robot_without_a_place_stands_and_still_measures_how_fast_it_is() -> None:
-    rig = Rig().drive_on()
-    rig.odometry = False
-
-    rig.perform(rig.machine.odometry(None, Twist2D(0.3, 0.0), rig.now))
-
-    assert rig.twist == REST
-    assert rig.machine.cap == Cap(0.0, "stale")
-    report = rig.machine.tick(rig.now + 1.0)[-1]
-    assert isinstance(report, Report)
-    assert report.report.linear == 0.3
 
 
 def test_a_robot_without_a_place_that_is_stopped_is_seen_to_stand() -> None:

@@ -33,6 +33,19 @@ def test_both_copies_of_a_message_are_timed_and_it_is_decided_on_once() -> None:
     assert took(desk, "iveg").count == 1
 
 
+def test_a_copy_that_comes_twice_counts_once() -> None:
+    desk = Desk()
+    told = odometry("AGI", origin=desk.next_origin())
+
+    for way in (DIRECT.id, DIRECT.id, FIWARE.id, FIWARE.id):
+        desk.ingest.enqueue(Received(told, desk.clock(), way))
+
+    assert {hop: took(desk, hop).count for hop in ("uplink", "fiware")} == {
+        "uplink": 1,
+        "fiware": 1,
+    }
+
+
 def test_what_waits_for_the_loop_is_part_of_the_third_hop() -> None:
     desk = Desk()
     told = odometry("AGI", origin=desk.next_origin())

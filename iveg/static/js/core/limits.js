@@ -3,8 +3,8 @@
  * page, so that no number is written here a second time.
  *
  * @typedef {{
- *   live_s: number, late_s: number, seen_s: number, ring_lasts_s: number,
- *   walking_m_s: number, growth_grace_s: number, ring_most_m: number,
+ *   live_s: number, late_s: number, seen_s: number, zone_lasts_s: number,
+ *   walking_m_s: number, growth_grace_s: number, zone_most_m: number,
  *   report_fresh_s: number, report_stale_s: number, standing_speed: number,
  *   slow_factor: number,
  * }} Limits those that pages use; names carry the unit
@@ -23,9 +23,9 @@ export const LIMITS = Object.freeze(JSON.parse(document.body.dataset.limits ?? "
  * @param {number} ageS
  * @param {number} [thenS]
  */
-export function ringRadius(radiusM, ageS, thenS = 0) {
+export function zoneRadius(radiusM, ageS, thenS = 0) {
   const walkedM = LIMITS.walking_m_s * (beyondGrace(ageS) - beyondGrace(thenS));
-  return Math.max(radiusM, Math.min(LIMITS.ring_most_m, radiusM + walkedM));
+  return Math.max(radiusM, Math.min(LIMITS.zone_most_m, radiusM + walkedM));
 }
 
 /** @param {number} ageS */

@@ -68,34 +68,13 @@ export function readText(text) {
 }
 
 /**
- * @param {ArrayBuffer} bytes one scan, or a frame of telemetry
+ * @param {ArrayBuffer} bytes a frame of telemetry
  * @returns {Message}
  */
 function readBytes(bytes) {
   const { head, start } = readHead(bytes);
-  if (typeof head?.frame !== "number") return readScan(bytes);
+  if (typeof head?.frame !== "number") throw new ProtocolError("no frame number");
   return { topic: "telemetry", data: readTelemetry(head, bytes, start) };
-}
-
-/**
- * Reads a scan frame; the points stay where they arrived, no byte is copied.
- *
- * Little-endian, as every browser's hardware is: `uint32` length of the head, the head
- * (JSON, padded to a multiple of four), then `float32` pairs x, y in `map` (m).
- *
- * @param {ArrayBuffer} bytes
- * @returns {{topic: string, data: Scan}}
- * @throws {ProtocolError}
- */
-export function readScan(bytes) {
-  const { head, start } = readHead(bytes);
-  if ((bytes.byteLength - start) % 8) throw new ProtocolError("half a point");
-  if (typeof head?.topic !== "string" || typeof head.robot_id !== "string") {
-    throw new ProtocolError("scan without topic or robot_id");
-  }
-  const { topic, robot_id, stamp, age_s } = head;
-  const points = new Float32Array(bytes, start);
-  return { topic, data: { robot_id, stamp, age_s, points } };
 }
 
 /**

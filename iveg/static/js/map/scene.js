@@ -49,7 +49,7 @@
  */
 
 import { ageOf, linkOf } from "../core/clock.js";
-import { LIMITS, ringRadius } from "../core/limits.js";
+import { LIMITS, zoneRadius } from "../core/limits.js";
 import { isBlind, situationOf } from "../core/situation.js";
 import { slotOf } from "../core/slots.js";
 
@@ -185,7 +185,7 @@ function unsureOfStop(robot, store, nowMs) {
 function unheard({ twist, replay }, ageS) {
   const speed = Math.abs(twist?.linear ?? 0);
   if (replay || linkOf(ageS) === "LIVE" || speed < LIMITS.standing_speed) return 0;
-  return speed * Math.min(ageS, LIMITS.ring_lasts_s);
+  return speed * Math.min(ageS, LIMITS.zone_lasts_s);
 }
 
 /**
@@ -243,7 +243,7 @@ function ringNow(person, stage, ageS) {
   const radiusM = person.radius_m;
   if (radiusM === null) return 0;
   if (stage === "seen") return radiusM;
-  return ringRadius(radiusM, ageS, person.age_s ?? 0);
+  return zoneRadius(radiusM, ageS, person.age_s ?? 0);
 }
 
 /**
@@ -258,7 +258,7 @@ function ringNow(person, stage, ageS) {
 function stageAt({ stage, radius_m }, ageS) {
   if (radius_m === null) return "last_seen";
   if (stage === "gone" || stage === "last_seen") return "last_seen";
-  if (ageS > LIMITS.ring_lasts_s) return "last_seen";
+  if (ageS > LIMITS.zone_lasts_s) return "last_seen";
   return stage === "seen" && ageS <= LIMITS.seen_s ? "seen" : "remembered";
 }
 

@@ -12,7 +12,7 @@
  */
 
 import { readApi } from "../core/api.js";
-import { ringRadius } from "../core/limits.js";
+import { zoneRadius } from "../core/limits.js";
 
 const BEFORE_MS = 3000;
 const AFTER_MS = 3000;
@@ -110,7 +110,7 @@ export function ringsOf({ sightings, span }, radiusM) {
   let next = 0;
   for (let at = seen[0]; at <= until; at += RING_EVERY_MS) {
     while (seen[next + 1] <= at) next += 1;
-    rings.push({ at, value: ringRadius(radiusM, (at - seen[next]) / 1000) });
+    rings.push({ at, value: zoneRadius(radiusM, (at - seen[next]) / 1000) });
   }
   return rings;
 }

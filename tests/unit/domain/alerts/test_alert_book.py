@@ -10,35 +10,6 @@ LOST = Condition("P1", "alert.moving_robot_lost", "AGI", "AGI")
 SLOWED = Condition("P2", "alert.person_slowed", "AGI/P1", "AGI")
 
 
-def test_what_is_wrong_is_raised_once() -> None:
-    book = AlertBook()
-
-    first = book.sync([LOST, SLOWED], at(0), "a")
-    again = book.sync([LOST, SLOWED], at(1), "b")
-
-    assert [one.condition for one in first] == [LOST, SLOWED]
-    assert again == []
-    assert len(book.waiting) == 2
-
-
-def test_what_is_no_longer_wrong_clears() -> None:
-    book = AlertBook()
-    book.sync([LOST], at(0), "a")
-
-    (cleared,) = book.sync([], at(5), "b")
-
-    assert cleared.cleared == at(5)
-
-
-def test_what_is_over_and_not_grave_waits_for_nobody() -> None:
-    book = AlertBook()
-    book.sync([replace(LOST, priority="P2")], at(0), "a")
-
-    book.sync([], at(5), "b")
-
-    assert book.waiting == []
-
-
 def test_a_p1_that_is_over_waits_until_somebody_has_seen_it() -> None:
     book = AlertBook()
     (raised,) = book.sync([LOST], at(0), "a")
@@ -108,18 +79,6 @@ def test_only_the_first_acknowledgement_counts() -> None:
     assert again.last.acknowledged_by == "ana"
 
 
-def test_a_new_occurrence_needs_a_new_acknowledgement() -> None:
-    book = AlertBook()
-    (raised,) = book.sync([LOST], at(0), "a")
-    book.acknowledge(raised.alert_id, "ana", "", at(1))
-    book.sync([], at(2), "b")
-
-    (again,) = book.sync([LOST], at(3), "c")
-
-    assert again.last.acknowledged is None
-    assert again.unseen == "P1"
-
-
 def test_what_changes_about_a_condition_is_shown_without_raising_it_again() -> None:
     book = AlertBook()
     book.sync([SLOWED], at(0), "a")
@@ -127,14 +86,6 @@ def test_what_changes_about_a_condition_is_shown_without_raising_it_again() -> N
 
     assert book.sync([nearer], at(1), "b") == []
     assert book.waiting[0].condition.slots == {"distance": 0.9}
-
-
-def test_of_two_conditions_of_one_kind_and_subject_the_graver_counts() -> None:
-    book = AlertBook()
-
-    (raised,) = book.sync([LOST, replace(LOST, priority="P3")], at(0), "a")
-
-    assert raised.priority == "P1"
 
 
 def test_13_6_a_p1_of_an_earlier_run_waits_on_and_joins_what_still_holds() -> None:

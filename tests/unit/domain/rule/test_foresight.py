@@ -10,17 +10,12 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Navigation, Odometry
 from iveg.domain.parameters import ByClass
-from iveg.domain.rule.foresight import Encounter, Encounters, Foresight, by_cause
+from iveg.domain.rule.foresight import Encounter, look_ahead
+from iveg.domain.rule.zones import zones_of
 from tests.builders import at, origin, received
 from tests.unit.domain.scene import FIELD, Scene, person
 
 MS_10 = CM = 0.01
-
-
-def told_of(found: Encounters) -> dict[str, Encounter]:
-    """What people are told of AGI."""
-    ahead = found.get("AGI", ())
-    return {**by_cause(ahead, "tells"), **by_cause(ahead, "slows")}
 
 
 class Ahead:
@@ -57,18 +52,13 @@ class Ahead:
         self.scene.world.apply(heard)
         return self
 
-    def foretold(self) -> Encounter | None:
-        scene = self.scene
-        found = Foresight().look(
-            scene.world, scene.people, DetectionRule(), at(scene.now)
-        )
-        return next(iter(by_cause(found.get("AGI", ()), "slows").values()), None)
-
-    def shown(self) -> Encounter | None:
-        """What people are told, which need not slow."""
-        scene, foresight = self.scene, Foresight()
-        found = foresight.look(scene.world, scene.people, scene.rule, at(scene.now))
-        return next(iter(told_of(found).values()), None)
+    def foretold(self, *, speed_before: float | None = None) -> Encounter | None:
+        """The encounter of AGI, which drove so fast before it was slow (m/s)."""
+        scene, now = self.scene, at(self.scene.now)
+        zones = zones_of(scene.world, scene.people, scene.rule, now)
+        before = {} if speed_before is None else {"AGI": speed_before}
+        found = look_ahead(scene.world, zones, scene.rule, now, before)
+        return next(iter(found.get("AGI", {}).values()), None)
 
     def must(self) -> Encounter:
         found = self.foretold()
@@ -86,8 +76,7 @@ def test_a_fresh_zone_of_a_class_with_a_wider_radius_is_told_as_fresh() -> None:
     ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0))
     wide = ByClass(2.0, {"person": 3.0})
     ahead.scene.rule = DetectionRule(radius_m=wide)
-    shown = ahead.see((4.6, 0.0)).shown()
-    assert shown is not None
+    shown = ahead.see((4.6, 0.0)).must()
     assert (shown.zone.radius_m, shown.zone.is_grown) == (3.0, False)
     assert shown.in_s == pytest.approx(1.6 / 0.8, abs=MS_10)
 
@@ -145,87 +134,17 @@ def test_who_was_not_seen_for_a_second_has_a_ring_and_no_forecast() -> None:
     ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0)).see((3.6, 0.0))
     ahead.scene.now = 1.2
     assert ahead.see().foretold() is None
-    assert ahead.shown() is None, "nor is it told of a glimpse"
 
 
-@pytest.mark.parametrize("missed_s", [0.9, 1.5, 2.0])
-def test_in_a_ring_that_grows_the_encounter_is_told_and_slows_no_more(
-    missed_s: float,
-) -> None:
-    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).walk(2.7, 0.0, 0.0, 0.0)
-    ahead.scene.now += missed_s
-    assert ahead.see().foretold() is None
-    shown = ahead.shown()
-    assert shown is not None
-    assert shown.in_s == pytest.approx(0.7 / 0.4, abs=MS_10)
-    assert shown.zone.radius_m == 2.0
-
-
-def test_of_a_slow_robot_it_is_told_whom_it_meets_soon_once_it_is_let_go() -> None:
+def test_of_a_slow_robot_it_is_told_whom_it_meets_once_it_is_let_go() -> None:
     ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.4, 0.0)).see((3.5, 0.0))
     assert ahead.foretold() is None, "3.75 s ahead"
-    assert ahead.shown() is None, "it is not slow for anything"
-    ahead.scene.report("AGI", factor=0.5)
-    assert ahead.foretold() is None
-    shown = ahead.shown()
-    assert shown is not None
-    assert shown.in_s == pytest.approx(1.5 / 0.8, abs=MS_10)
-    assert ahead.see((3.7, 0.0)).shown() is None, "2.1 s ahead"
-    assert ahead.see((3.0, 0.0)).shown() == ahead.must(), "2.5 s ahead as it drives"
-
-
-def _told_later(ahead: Ahead, *xs: float) -> tuple[Encounter | None, Encounter | None]:
-    """What slows and what is told after more pictures, a tenth of a second apart."""
-    scene, foresight = ahead.scene, Foresight()
-    for x in (None, *xs):
-        if x is not None:
-            scene.now = round(scene.now + 0.1, 6)
-            ahead.see((x, 0.0))
-        found = foresight.look(scene.world, scene.people, scene.rule, at(scene.now))
-    slows = by_cause(found.get("AGI", ()), "slows")
-    return slows.get("P1"), told_of(found).get("P1")
-
-
-@pytest.mark.parametrize(
-    ("x", "vx", "then", "in_s"),
-    [
-        (3.0, 1.4, (3.0, 3.0), 1.0 / 0.5),
-        (5.5, 0.0, (5.36, 5.22), 3.22 / 1.9),
-    ],
-    ids=["who walked ahead stops", "who stood comes"],
-)
-def test_by_their_newest_step_an_encounter_is_told_that_slows_nobody_yet(
-    x: float, vx: float, then: tuple[float, ...], in_s: float
-) -> None:
-    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.5, 0.0)).walk(x, 0.0, vx, 0.0)
-    slows, shown = _told_later(ahead, *then)
-    assert slows is None
-    assert shown is not None
-    assert shown.in_s == pytest.approx(in_s, abs=MS_10)
-
-
-@pytest.mark.parametrize(
-    ("x", "then"),
-    [
-        (5.03, (5.07, 4.98, 5.05, 5.0)),
-        (1.9, (2.0, 1.9)),
-        (5.5, ()),
-        (5.5, (5.52,)),
-    ],
-    ids=["noise of a detector", "in the ring", "nothing new", "one picture"],
-)
-def test_of_no_step_there_is_nothing_to_tell(x: float, then: tuple[float, ...]) -> None:
-    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.5, 0.0)).walk(x, 0.0, 0.0, 0.0)
-    assert _told_later(ahead, *then) == (None, None)
-
-
-def test_no_step_is_longer_than_a_walker_makes() -> None:
-    """A box that jumps by 0.5 m is taken for 0.32 m in 0.2 s."""
-    ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.5, 0.0)).walk(7.2, 0.0, 0.0, 0.0)
-    slows, shown = _told_later(ahead, 7.2, 6.7)
-    assert slows is None
-    assert shown is not None
-    assert shown.in_s == pytest.approx(4.7 / (0.5 + 1.6), abs=MS_10)
+    again = ahead.foretold(speed_before=0.8)
+    assert again is not None
+    assert again.effect == "holds"
+    assert again.in_s == pytest.approx(1.5 / 0.8, abs=MS_10)
+    now = ahead.see((3.0, 0.0)).foretold(speed_before=0.8)
+    assert now == ahead.must(), "2.5 s ahead as it drives"
 
 
 def test_its_own_plan_counts_before_the_arc_of_its_twist() -> None:

@@ -38,7 +38,7 @@ def test_who_was_seen_once_long_ago_gives_way_and_who_was_seen_twice_never() -> 
     scene = full()
     scene.now = 0.5
     scene.look("AGI", person(0.0))
-    scene.now = LIMITS.ring_lasts_s + LIMITS.seen_s
+    scene.now = LIMITS.zone_lasts_s + LIMITS.seen_s
     crowd(scene, 3, first=3 * MAX_PEOPLE)
     left = {one.person_id for one in scene.everyone}
     assert {"P1", "P257", "P258", "P259"} <= left

@@ -110,14 +110,6 @@ def test_who_is_not_surely_seen_blinds_nobody(seen: tuple[Detection, ...]) -> No
     assert blind_by(watch(fleet(), 8.0, seen=seen)) is None
 
 
-def test_who_is_shown_faintly_now_and_then_blinds_nobody() -> None:
-    scene = fleet()
-    for _ in range(4):
-        watch(scene, 4.5)
-        watch(scene, 0.1, person(SPOT + 0.5, probability=0.25))
-    assert blind_by(scene) is None
-
-
 def test_a_robot_that_contradicts_itself_names_nobody_blind() -> None:
     scene = fleet()
     for _ in range(80):

@@ -71,18 +71,6 @@ def test_a_box_without_a_frame_lands_on_the_person_where_the_fleet_names_the_fra
 
 
 @robots
-@frames
-def test_a_box_lands_on_the_person_where_it_names_its_frame_itself(
-    robot_id: str, frame: Frame
-) -> None:
-    scene = scene_of(robot_id, "base_link")
-
-    (placed,) = scene.look(robot_id, somebody(robot_id, frame, f"/{robot_id}/{frame}"))
-
-    assert math.dist(placed.position[:2], PERSON) < 0.05
-
-
-@robots
 @pytest.mark.parametrize("frame", ["base_link", "camera_link"])
 def test_until_the_fleet_names_it_one_person_has_a_ring_at_both_places(
     robot_id: str, frame: Frame
@@ -168,28 +156,9 @@ def test_a_thing_in_a_frame_that_nobody_described_is_named_and_not_counted() -> 
     )
 
 
-def test_a_faint_person_without_a_place_counts_where_the_rule_looks_for_them() -> None:
-    scene = scene_of("AGI")
-    scene.rule = replace(scene.rule, possible_people=True)
-
-    scene.look("AGI", replace(somebody("AGI", "map", "odom"), probability=0.6))
-
-    assert scene.people.unplaced == 1
-
-
 def test_somebody_seen_by_a_robot_without_a_pose_is_without_a_place() -> None:
     scene = Scene()
 
     scene.look("AGI", somebody("AGI", "base_link", "base_link"))
 
-    assert (scene.people.unplaced, scene.people.unknown_frames) == (1, frozenset())
-
-
-def test_without_a_described_camera_only_the_place_in_base_link_is_known() -> None:
-    scene = Scene(("R1",))
-    scene.drive("R1", HERE.x, HERE.y, HERE.yaw)
-
-    (placed,) = scene.look("R1", Detection("farmer", 0.9, box_at(2.0, 0.0)))
-
-    assert placed.position[:2] == pytest.approx(HERE.transform(2.0, 0.0))
     assert (scene.people.unplaced, scene.people.unknown_frames) == (1, frozenset())

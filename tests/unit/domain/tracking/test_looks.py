@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import pytest
 
-from iveg.domain.tracking.calibration import Calibration
 from iveg.domain.tracking.looks import (
     LOOK_S,
     MOST_SUSPECTS,
+    Calibration,
     FaintPerson,
     Looks,
     Suspicions,

@@ -49,15 +49,6 @@ def test_a_faint_farmer_or_another_object_is_shown_and_is_nobody(
     assert scene.everyone == []
 
 
-def test_a_person_who_walks_stays_the_same_person() -> None:
-    scene = Scene()
-    for tenth in range(50):
-        scene.now = tenth / 10
-        scene.look("AGI", person(3.0 + 0.15 * tenth))
-
-    assert [one.person_id for one in scene.everyone] == ["P1"]
-
-
 def test_someone_more_than_two_metres_away_is_someone_else() -> None:
     scene = Scene()
     scene.look("AGI", person(3.0))

@@ -48,14 +48,6 @@ def test_a_thing_slows_nobody_and_is_still_known() -> None:
     assert len(scene.everyone) == 1
 
 
-def test_without_the_mark_it_does() -> None:
-    scene = marked()
-    scene.people.things.known.clear()
-    see(scene, (1.55, 0.85))
-
-    assert factor(scene) == 0.5
-
-
 def test_a_mark_frees_a_track_that_was_there_before() -> None:
     scene = marked()
     scene.people.things.known.clear()

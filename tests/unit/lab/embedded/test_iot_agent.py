@@ -83,9 +83,12 @@ async def test_what_is_discarded_changes_nothing(
 async def test_a_device_of_another_shape_or_with_what_is_not_supported_is_refused(
     up: Running, part: dict[str, object], status: str
 ) -> None:
+    entity = {"entity_name": "AGI", "entity_type": "Robot"}
     async with IotAgentClient(up.iota_url, *TENANT) as agent:
         with pytest.raises(HopError, match=status):
-            await agent.create_device({"device_id": "D", "apikey": "iveg", **part})
+            await agent.create_device(
+                {"device_id": "D", "apikey": "iveg", **entity, **part}
+            )
 
 
 async def test_a_command_whose_provider_is_away_is_404(
@@ -100,7 +103,13 @@ async def test_a_command_whose_provider_is_away_is_404(
 async def test_a_device_is_of_the_tenant_of_the_request_whatever_it_says(
     up: Running,
 ) -> None:
-    device = {"device_id": "D", "apikey": "iveg", "service": "other"}
+    device = {
+        "device_id": "D",
+        "apikey": "iveg",
+        "service": "other",
+        "entity_name": "AGI",
+        "entity_type": "Robot",
+    }
     async with IotAgentClient(up.iota_url, *TENANT) as agent:
         await agent.create_device(device)
         (made,) = await agent.read_devices()

@@ -10,8 +10,7 @@ import aiomqtt
 import pytest
 
 from iveg.lab.embedded import mqtt_broker as broker_module
-from iveg.lab.embedded.mqtt_broker import MqttBroker, mqtt_broker
-from iveg.lab.embedded.mqtt_packets import publish_packet
+from iveg.lab.embedded.mqtt_broker import MqttBroker, mqtt_broker, publish_packet
 
 
 @pytest.fixture

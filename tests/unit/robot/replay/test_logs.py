@@ -12,7 +12,7 @@ import pytest
 from iveg.adapters.recordings.incoming import NOTIFICATIONS
 from iveg.adapters.recordings.mcap_file import Channel, McapFile
 from iveg.domain.errors import DataFileError
-from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import DetectionFrame, LaserScan, Odometry
 from iveg.ngsi import codec
 from iveg.robot.replay.logs import LogReader, RecordingEntry
@@ -39,15 +39,6 @@ def written(tmp_path: Path, *lines: str) -> Path:
     file = tmp_path / "log.jsonl"
     file.write_text("\n".join(lines) + "\n", "utf-8")
     return file
-
-
-def test_a_line_of_odometry_is_pose_and_speeds(tmp_path: Path) -> None:
-    (entry,) = LogReader(written(tmp_path, ODOM)).entries()
-
-    assert entry.at == 0.0
-    assert isinstance(entry.observation, Odometry)
-    assert entry.observation.pose == Pose2D(1.0, 2.0, 0.5)
-    assert entry.observation.twist == Twist2D(0.3, -0.1)
 
 
 def test_the_offset_of_the_sensor_becomes_its_mount(tmp_path: Path) -> None:

@@ -63,20 +63,6 @@ def test_poses_between_two_recorded_ones_are_interpolated() -> None:
     assert twist.linear_x == pytest.approx(1.5)
 
 
-def test_the_newest_sweep_stays_until_the_next() -> None:
-    first, second = swept(0.1), swept(0.6)
-    playback = Playback(
-        log(moved(0.0, 0.0), first, second, moved(1.0, 1.0)), loop=False
-    )
-
-    shown = [playback.scan]
-    for _ in range(3):
-        playback.advance(0.25)
-        shown.append(playback.scan)
-
-    assert shown == [None, first.observation, first.observation, second.observation]
-
-
 def test_a_detection_is_seen_for_a_moment_of_the_recording() -> None:
     playback = Playback(log(moved(0.0, 0.0), saw(0.5), moved(9.0, 1.0)), loop=False)
     at_first = playback.has_detector
@@ -130,18 +116,6 @@ def test_a_detector_of_whole_frames_that_falls_silent_sees_nobody_no_longer(
     assert (seen, silent) == (True, False)
     assert not playback.has_detector
     assert playback.detections == ()
-
-
-def test_a_recording_ends_after_its_last_entry() -> None:
-    playback = Playback(log(moved(0.0, 0.0), moved(1.0, 2.0)), loop=False)
-
-    playback.advance(0.9)
-    before = playback.ended
-    playback.advance(0.2)
-
-    assert not before
-    assert playback.ended
-    assert playback.motion[0].x == 2.0
 
 
 def test_a_loop_starts_over_and_never_ends() -> None:
@@ -199,19 +173,6 @@ def test_a_bag_of_each_kind_gives_odometry_and_scans(
     )
 
 
-def test_the_stamps_of_the_sensors_are_the_time(tmp_path: Path) -> None:
-    found = entries(db3_bag(tmp_path / "run", drive(1.0)))
-
-    assert [e.at for e in found] == pytest.approx([n // 2 / 10 for n in range(20)])
-
-
-def test_a_named_topic_is_the_one_that_is_read(tmp_path: Path) -> None:
-    said = [Said("/raw", ODOMETRY, 1.0, x=7.0), *drive(1.0)]
-    bag = db3_bag(tmp_path / "run", said)
-
-    assert [p.x for p in poses(entries(bag, BagOptions("/raw")))] == [7.0]
-
-
 @pytest.mark.parametrize(
     ("topics", "why"),
     [
@@ -234,16 +195,6 @@ def test_topics_that_leave_open_what_is_meant_are_listed(
 
 
 SAW = '{"t":1,"kind":"detection","class":"farmer","probability":0.9,"x":5,"y":1}\n'
-
-
-def test_a_log_without_odometry_is_refused_unless_it_is_said_where_it_stands(
-    tmp_path: Path,
-) -> None:
-    file = tmp_path / "camera.jsonl"
-    file.write_text(SAW)
-
-    with pytest.raises(DataFileError, match=r"holds no odometry .*--pose says where"):
-        open_recording(file, MOUNT)
 
 
 def test_a_log_of_a_fixed_camera_stands_where_it_was_said(tmp_path: Path) -> None:
@@ -299,11 +250,3 @@ def test_a_bag_that_was_cut_off_never_ends_in_anything_but_a_sentence(
 
     with pytest.raises(DataFileError, match=f"{file.name}: cannot be read: "):
         entries(file)
-
-
-@pytest.mark.parametrize("name", ["notes.txt", "log.bag"])
-def test_what_is_no_recording_by_its_name_is_refused(name: str, tmp_path: Path) -> None:
-    with pytest.raises(
-        DataFileError, match=r"is none of \.jsonl, .*\.mcap, and no dir"
-    ):
-        entries(tmp_path / name)

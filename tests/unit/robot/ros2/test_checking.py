@@ -41,10 +41,6 @@ def faults(
     return {one.code: one.about for one in noted.faults(100.0 + after)}
 
 
-def test_a_base_that_hears_the_gate_is_no_fault() -> None:
-    assert faults(BASE, after=60.0) == {}
-
-
 @pytest.mark.parametrize(
     ("base", "config", "about"),
     [
@@ -68,13 +64,6 @@ def test_a_base_that_cannot_hear_the_gate_is_named_at_once(
     assert faults(base, config=config) == {"drive_unheard": about}
 
 
-def test_a_drive_on_which_nobody_listens_is_named_after_discovery() -> None:
-    odometry = endpoint("/odom", ros.Odometry)
-
-    assert faults(odometry, after=4.0) == {}
-    assert faults(odometry, after=5.5) == {"drive_unheard": "/cmd_vel"}
-
-
 @pytest.mark.parametrize(
     ("others", "unheard", "code"),
     [
@@ -92,19 +81,6 @@ def test_a_gate_that_is_blind_halves_the_speed(
     lookout.look(others, unheard, 105.5)
 
     assert speed_of(noted.faults(105.5)) == (0.5, code)
-
-
-def test_a_topic_of_a_type_that_is_not_read_is_named_with_it() -> None:
-    scan = endpoint("/scan", ros.PointCloud2)
-
-    assert faults(BASE, scan) == {"wrong_type": "/scan: sensor_msgs/PointCloud2"}
-
-
-@pytest.mark.parametrize(
-    "message", [ros.Detection3DArray, d.BoundingBoxes3d, d.DetectionArray]
-)
-def test_a_detector_of_a_family_that_is_read_is_no_fault(message: type) -> None:
-    assert faults(BASE, endpoint("/detections_3d", message)) == {}
 
 
 def test_who_announces_fields_is_heard_by_each_definition() -> None:
@@ -228,22 +204,6 @@ def test_what_is_wrong_is_said_beside_its_topic_alone(
     found: dict[str, str], topic: str, verdict: str
 ) -> None:
     assert found == {topic: verdict}
-
-
-def test_boxes_in_a_picture_need_its_depth() -> None:
-    boxes = endpoint("/boxes", d.BoundingBoxes)
-    other = replace(boxes, type_hash=type_hash(d.NumberedBoundingBoxes))
-
-    found = wrong(boxes, other, without="seen", config=CAMERA, detections_2d=5.0)
-
-    assert found == {
-        "/camera/aligned_depth_to_color/image_raw": (
-            "nobody publishes it (sensor_msgs/msg/Image)"
-        ),
-        "/camera/color/camera_info": (
-            "nobody publishes it (sensor_msgs/msg/CameraInfo)"
-        ),
-    }
 
 
 def test_a_domain_where_nobody_is_and_an_interface_that_hears_none_are_told() -> None:

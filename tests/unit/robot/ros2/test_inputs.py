@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import (
     Battery,
     DetectionFrame,
@@ -18,7 +17,6 @@ from iveg.domain.observations import (
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.reading import speed_of
 from iveg.robot.ros2.topics import sensed_topics
-from iveg.ros2 import cdr
 from iveg.ros2 import messages as ros
 from tests.unit.robot.ros2 import said
 from tests.unit.robot.ros2.said import Bench, link, look, seen, tf
@@ -63,29 +61,6 @@ def test_odometry_that_the_tree_contradicts_is_named(
     assert bench.faults() == faults
 
 
-def test_of_what_waited_only_the_newest_goes_out() -> None:
-    bench = Bench()
-    waited = [said.odometry(float(n), after=n / 100) for n in range(5)]
-
-    bench.inputs.hear("odometry", [cdr.write(o) for o in waited], said.MONO)
-    (found,) = bench.tick()
-
-    assert isinstance(found, Odometry)
-    assert found.pose.x == 14.0
-    assert bench.tick() == []
-
-
-def test_without_a_transform_odometry_is_unplaced_and_the_link_is_named() -> None:
-    bench = Bench(tree=False)
-
-    found = bench.hear("odometry", said.odometry(2.0, 0.4)).tick()
-
-    assert [(one.kind, one.twist) for one in found if isinstance(one, Unplaced)] == [
-        ("odometry", Twist2D(0.4, 0.0))
-    ]
-    assert bench.faults() == {"no_transform": "map → odom"}
-
-
 def test_the_first_data_wait_for_the_transforms_that_follow_them() -> None:
     """Localisation publishes map → odom later than the base publishes its own."""
     bench = Bench(tree=False, heard_for=0.0)
@@ -103,17 +78,6 @@ def test_the_first_data_wait_for_the_transforms_that_follow_them() -> None:
     assert bench.faults(0.6) == {}
 
 
-def test_the_first_data_wait_no_longer_than_a_transform_may_be_old() -> None:
-    bench = Bench(tree=False, heard_for=0.0).hear("odometry", said.odometry())
-
-    early = bench.tick(0.5)
-    (late,) = bench.tick(0.6)
-
-    assert early == []
-    assert isinstance(late, Unplaced)
-    assert bench.faults(0.6) == {"no_transform": "map → odom"}
-
-
 def test_an_old_transform_is_named_with_its_age_and_places_nothing() -> None:
     bench = Bench().hear("odometry", said.odometry(after=2.1), 2.1)
 
@@ -124,19 +88,6 @@ def test_an_old_transform_is_named_with_its_age_and_places_nothing() -> None:
     assert (fault.code, fault.about) == ("no_transform", "map → odom")
     assert fault.for_s == pytest.approx(2.1)
     assert bench.inputs.place is None
-
-
-def test_a_transform_that_comes_back_places_again_and_the_fault_goes() -> None:
-    bench = Bench().hear("odometry", said.odometry(after=2.1), 2.1)
-    bench.tick(2.1)
-
-    bench.hear("tf", tf(link("map", "odom", 10.0, after=2.2)), 2.2)
-    bench.hear("odometry", said.odometry(after=2.2), 2.2)
-    (found,) = bench.tick(2.2)
-
-    assert isinstance(found, Odometry)
-    assert bench.faults(2.3) == {"no_transform": "map → odom"}
-    assert bench.faults(4.2) == {}
 
 
 def test_silence_of_odometry_is_named_from_the_start() -> None:
@@ -174,14 +125,6 @@ def test_odometry_that_cannot_be_is_named_and_slows(
     assert speed_of(bench.inputs.input_faults.faults(said.MONO)) == (0.5, code)
 
 
-def test_time_that_goes_back_is_named_and_its_message_is_dropped() -> None:
-    bench = Bench().hear("odometry", said.odometry(1.0, after=0.1))
-    bench.tick()
-
-    assert bench.hear("odometry", said.odometry(after=0.05)).tick() == []
-    assert bench.faults() == {"time_back": "/odom"}
-
-
 def test_a_clock_that_was_set_back_is_believed_after_five_messages() -> None:
     bench = Bench().hear("odometry", said.odometry(after=0.1))
     bench.tick()
@@ -199,25 +142,6 @@ def test_a_clock_that_was_set_back_is_believed_after_five_messages() -> None:
     assert [type(one) for one in heard[4]] == [Unplaced]
     assert isinstance(found, Odometry)
     assert bench.faults()["time_back"] == "/odom"
-
-
-def test_a_clock_that_is_off_by_an_hour_is_named() -> None:
-    bench = Bench(tree=False)
-    bench.hear("tf", tf(link("map", "odom", 10.0, after=3600.0)))
-
-    (found,) = bench.hear("odometry", said.odometry(after=3600.0)).tick()
-
-    assert isinstance(found, Odometry)
-    assert bench.faults() == {"clock_off": "/odom"}
-
-
-def test_a_flood_is_named() -> None:
-    bench = Bench()
-    waited = [cdr.write(said.odometry(after=n / 1000)) for n in range(50)]
-
-    bench.inputs.hear("odometry", waited, said.MONO, 50)
-
-    assert bench.faults() == {"flood": "/odom"}
 
 
 def test_bytes_of_another_layout_are_named() -> None:
@@ -321,15 +245,6 @@ def test_only_a_beam_that_did_not_come_back_found_nothing() -> None:
     assert found.returns().tolist() == [False] * 6 + [True]
 
 
-def test_a_scan_long_after_the_last_odometry_is_unplaced() -> None:
-    bench = Bench().hear("odometry", said.odometry())
-    bench.tick()
-
-    (found,) = bench.hear("scan", said.scan(after=0.8), 0.8).tick(0.8)
-
-    assert isinstance(found, Unplaced)
-
-
 # --- detections ---------------------------------------------------------------------
 
 
@@ -378,15 +293,6 @@ def test_no_pose_of_a_path_is_told_twice(count: int) -> None:
     assert len(set(found.path)) == len(found.path) <= 1024
     assert found.path[0] == (0.0, 0.0)
     assert found.path[-1] == found.goal == (count - 1.0, 0.0)
-
-
-def test_an_empty_plan_is_an_idle_robot() -> None:
-    header = ros.Header(said.stamp(), "map")
-
-    (found,) = Bench().hear("path", ros.Path(header)).tick()
-
-    assert isinstance(found, Navigation)
-    assert (found.task, found.path) == ("idle", ())
 
 
 @pytest.mark.parametrize(

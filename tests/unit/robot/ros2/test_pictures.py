@@ -116,16 +116,6 @@ def test_a_mask_says_which_pixels_are_whose() -> None:
     assert left.ymin > -0.1
 
 
-def test_a_look_waits_for_its_depth_picture() -> None:
-    one = bench().hear("camera_info", info()).hear("detections_2d", look(box()))
-    early = one.tick()
-
-    found = grounded(one.hear("depth", depth(), 0.1), 0.1)
-
-    assert early == []
-    assert len(found.detections) == 1
-
-
 def test_a_look_whose_depth_never_comes_counts_everybody_as_lost() -> None:
     one = bench().hear("camera_info", info()).hear("detections_2d", look(box()))
     one.tick()

@@ -58,21 +58,6 @@ def test_a_moment_after_the_newest_it_still_counts_and_then_it_is_named() -> Non
     assert error.value.for_s == pytest.approx(2.1)
 
 
-def test_a_link_that_never_was_is_named_by_what_it_would_join() -> None:
-    found = tree(link("odom", "base_link"))
-
-    with pytest.raises(NoTransformError, match=r"^no map → odom$"):
-        found.lookup("map", "laser", WALL)
-
-
-def test_only_ten_seconds_are_kept() -> None:
-    found = tree(*(link("map", "odom", float(n), after=n / 2) for n in range(40)))
-
-    assert found.lookup("map", "odom", WALL + 10.0).flat().x == 20.0
-    with pytest.raises(NoTransformError):
-        found.lookup("map", "odom", WALL + 5.0)
-
-
 @pytest.mark.parametrize(
     "bad",
     [
@@ -88,15 +73,6 @@ def test_only_ten_seconds_are_kept() -> None:
 )
 def test_what_is_no_transform_is_refused(bad: ros.TransformStamped) -> None:
     assert TransformBuffer().add(tf(bad), static=False) == 1
-
-
-def test_an_older_transform_changes_nothing() -> None:
-    found = tree(link("map", "odom", 1.0, after=1.0))
-
-    refused = found.add(tf(link("map", "odom", 9.0)), static=False)
-
-    assert refused == 1
-    assert found.lookup("map", "odom", WALL + 1.0).flat().x == 1.0
 
 
 def test_two_frames_that_are_each_others_parent_end_nowhere() -> None:

@@ -15,7 +15,7 @@ START = at(0.0).mono
 
 def watching() -> tuple[LatencyWatch, Painting]:
     """AGI's odometry was decided on at 1.0 s."""
-    watch = LatencyWatch(("AGI",))
+    watch = LatencyWatch(("AGI",), lambda *_: None)
     watch.decided([Received(odometry(origin=origin()), at(0.9), DIRECT.id)], at(1.0))
     return watch, Painting(watch)
 
