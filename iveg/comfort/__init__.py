@@ -1,1 +1,1 @@
-"""What may fail by itself, and nothing vital notices: history, map, messages, goals."""
+"""Parts that may fail by themselves, and nothing vital notices: history, map, messages, goals."""

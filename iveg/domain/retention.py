@@ -1,10 +1,8 @@
-"""How long the history keeps what, and the moments before which rows may go.
+"""Horizons of the history, and room on its disk: what is kept how long.
 
 Horizons are counted by the days that iVeg recorded, not by the clock alone.  A gap
 between two of them counts for three days at most: a clock that is wrong by years takes
 three days of what is kept and no more (docs/decisions/0006-days-that-were-recorded.md).
-
-Room on a disk: when people are told that it runs out, and when it is well again.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

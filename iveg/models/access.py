@@ -71,7 +71,7 @@ class OpenSession(Model):
 
 
 class SessionsEnded(Model):
-    """How many sessions have ended.
+    """Number of sessions that have ended.
 
     Attributes:
         ended: How many.

@@ -290,7 +290,7 @@ class LatencySpread(Model):
 
     @classmethod
     def of(cls, values: Iterable[float | None]) -> Self:
-        """Of measured times, to a tenth of a millisecond; missing ones do not count."""
+        """Spread of measured times, without missing ones."""
         known = sorted(value for value in values if value is not None)
         return cls(
             count=len(known),

@@ -49,7 +49,7 @@ class Alert(Row):
 
 
 class AcknowledgedAlerts(Model):
-    """What became of alerts that somebody acknowledged together.
+    """Outcome of alerts that somebody acknowledged together.
 
     Attributes:
         items: Those that this acknowledged.
@@ -69,7 +69,7 @@ class LogEntry(Row):
 
 
 class Note(Model):
-    """What somebody wrote about a moment; nobody can change it.
+    """Somebody's words about a moment; nobody can change them.
 
     Attributes:
         note_id: Number of its line in the log.
@@ -245,7 +245,7 @@ class Decision(Row):
 
 
 def sentence_of(record: DecisionRecord) -> Sentence:
-    """The same sentence that the log used when it happened."""
+    """Sentence that the log used when it happened."""
     is_walker = record.reason == "person" and record.confidence is None
     reason = "walker" if is_walker else record.reason or "default"
     if record.kind == "alert":

@@ -57,7 +57,7 @@ class Evidence(Model):
 
     @classmethod
     def of(cls, looks: Looks | None) -> Self | None:
-        """What is known; None where nothing adds up."""
+        """Evidence of these looks; None where nothing adds up."""
         if looks is None:
             return None
         return cls.from_value(

@@ -87,7 +87,7 @@ READINGS = {kind.name: _reading_model(kind) for kind in SENSED}
 
 
 def newest_reading(robot: RobotState, kind: Kind, now: Instant) -> SensorReading | None:
-    """What a small sensor said last; None before the first."""
+    """Newest reading of a small sensor; None before the first."""
     read = robot.sensed.get(kind.of)
     if read is None:
         return None
@@ -339,7 +339,7 @@ class Fault(Model):
 
 
 class SeenObstacle(Model):
-    """What a robot's laser sees near it and nothing explains, in ``map`` (m).
+    """Obstacle that a robot's laser sees and nothing explains, in ``map`` (m).
 
     Attributes:
         x: Its middle in ``map`` (m).

@@ -13,7 +13,7 @@ from iveg.models.base import Model, Stamp, Tenth
 
 
 class Doings(Model):
-    """What one version of the rule did over a range."""
+    """Deeds of one version of the rule over a range."""
 
     slowed_s: dict[str, Tenth] = Field(
         description="Reason → seconds of a robot at half speed."

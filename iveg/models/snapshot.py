@@ -79,7 +79,7 @@ class ClimateReading(Air):
 
 
 class TileName(Model):
-    """What people call it, by language.
+    """Name of a tile, by language.
 
     Attributes:
         es: By language.

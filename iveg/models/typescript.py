@@ -1,4 +1,4 @@
-"""What the page has from Python: ``python -m iveg.models.typescript``.
+"""Files that the page has from Python: ``python -m iveg.models.typescript``.
 
 The output, the types of the models (``static/js/types.d.ts``), the small sensors and
 the order of situations (``static/js/core``), is checked in; a test fails when it is

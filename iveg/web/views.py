@@ -305,7 +305,7 @@ class Views:
         )
 
     def safety(self, now: Instant) -> Safety:
-        """How soon the fleet obeys."""
+        """Reaction times of the fleet."""
         return Safety.of(acknowledgements_of(self._evaluator.live_decisions(), now))
 
     def climate(self, now: Instant) -> Climate | None:

@@ -199,7 +199,7 @@ def read_page(connection: Connection, of: ListOf[R], asked: Filter) -> Page[R]:
 
 
 def question_of(of: ListOf[Any], asked: Filter) -> str:
-    """What tells a question from others: its list, filters and order, short."""
+    """Digest of a question: its list, filters and order."""
     rows = of.table.name, str(of.which), replace(asked, limit=0, cursor=None)
     return blake2s(repr(rows).encode(), digest_size=6).hexdigest()
 
@@ -209,14 +209,14 @@ def _name(sort: str) -> str:
 
 
 def _group(of: ListOf[R], sort: str) -> tuple[ColumnElement[Any], ...]:
-    """What a list is sorted by before its time; empty: by that alone."""
+    """Columns that sort a list before its time; empty: by that alone."""
     if _name(sort) == BY_TIME:
         return ()
     return _as_counted(func.coalesce(of.table.c[of.sorts[_name(sort)]], ""))
 
 
 def _as_counted(name: ColumnElement[str]) -> tuple[ColumnElement[Any], ...]:
-    """What sorts names that may end in a number as people count: R2 before R10.
+    """Sort keys of names that may end in a number, as people count: R2 before R10.
 
     Of the names that differ by that number alone, the shorter has the smaller.
     """
@@ -237,7 +237,7 @@ def _order(
 def _after(
     of: ListOf[R], group: tuple[ColumnElement[Any], ...], asked: Filter
 ) -> Iterator[ColumnElement[bool]]:
-    """What comes after the cursor."""
+    """Condition of the rows after the cursor."""
     if (cursor := asked.cursor) is None:
         return
     falls = asked.sort.startswith("-")

@@ -1,13 +1,12 @@
 """Moves offered records into the database, without ever making the pipeline wait.
 
-One task gathers batches, one thread writes them.  Rows of orders go to the journal at
-once (``flushed``), which holds them until the database has them; while it is away, all
-others wait in a bounded queue, of which the oldest give way::
+One task gathers batches, one thread writes them, each in one transaction.  Rows of
+orders go to the journal at once (``flushed``), which holds them until the database has
+them; while it is away, all others wait in a bounded queue, of which the oldest give
+way::
 
     enqueue ──> queue ──> batch ──> database
        └─ orders ─> journal ─┘  at the next start
-
-Batches of records into the tables: one transaction each, all or nothing.
 
 Rows of one kind that the database does not take for their values are counted and left
 out, so that they cannot hold up everything behind them.

@@ -73,7 +73,7 @@ class JsonValue(TypeDecorator[Any]):
         self.shape = shape
 
     def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
-        """What the database knows."""
+        """Type that the database knows."""
         kind: TypeEngine[Any] = Text() if dialect.name == "sqlite" else JSONB()
         return dialect.type_descriptor(kind)
 

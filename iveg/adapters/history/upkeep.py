@@ -125,7 +125,7 @@ def _pruned(column: str, members: tuple[str, ...], dialect: str) -> TextClause:
 def lost_of(
     connection: Connection, since: float, until: float
 ) -> tuple[Literal["places", "telemetry"], ...]:
-    """What is no longer kept of ``since <= at < until``, or of a part of it."""
+    """Kinds of rows no longer kept of ``since <= at < until``, or of a part of it."""
     d, s = detections.c, decisions.c
     decided = and_(s.started_at >= since, s.started_at < until)
     # A decision was about somebody, and its robot drove.

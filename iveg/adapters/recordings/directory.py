@@ -46,7 +46,7 @@ class RecordingDirectory:
         file.path.rename(file.path.with_suffix(""))
 
     def left_open(self) -> Sequence[Path]:
-        """What a crash left; ask before a recording begins."""
+        """Files that a crash left open; ask before a recording begins."""
         return sorted(self.path.glob("*" + _OPEN))
 
     def files(self) -> Sequence[RecordingFile]:

@@ -1,4 +1,4 @@
-"""What viewers such as Foxglove draw of the messages that came in, thinned.
+"""Messages for viewers such as Foxglove, made of those that came in, thinned.
 
 ``foxglove.json`` has the schemas (https://docs.foxglove.dev/docs/sdk/schemas).  Frames
 are ``map`` and ``{robot}/base_link``.
@@ -43,7 +43,7 @@ def _channel(topic: str, schema: str) -> Channel:
 
 
 def messages_of(observation: Observation, wall: float) -> Iterator[Told]:
-    """What viewers draw of an observation that came at ``wall`` (Unix s)."""
+    """Messages for viewers, of an observation that came at ``wall`` (Unix s)."""
     at, robot_id = _time(wall), observation.robot_id
     base = f"{robot_id}/{_BASE}"
     match observation:

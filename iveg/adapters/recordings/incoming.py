@@ -1,4 +1,4 @@
-"""What a recording holds, and its way to the process that writes it.
+"""Inputs of a recording, and their way to the process that writes them.
 
 An input is a line of JSON and a payload, so that the loop packs it in a microsecond and
 nothing is read before it is in the other process.
@@ -25,7 +25,7 @@ _NUMBERS = re.compile(rb"\[[-+.,\deE\snul]{100,}\]")
 
 
 class Sort(IntEnum):
-    """What came in; what its name says."""
+    """Sort of an input, which says what its name is."""
 
     MEASURE = 1
     """A message of MQTT: its topic."""

@@ -78,7 +78,7 @@ class McapFile:
         self.add_at(channel, self._ns(at), payload)
 
     def add_at(self, channel: Channel, log_time: int, payload: bytes) -> None:
-        """The same at a time of this file's own (ns)."""
+        """Append a message at a time of this file's own (ns)."""
         number = self._channels.get(channel.topic)
         if number is None:
             number = self._register(channel)
@@ -289,7 +289,7 @@ def _between(path: Path, first: int, last: int) -> Iterator[RecordedMessage]:
 
 
 def _by_index(path: Path, first: int, last: int) -> Iterator[RecordedMessage]:
-    """Of a finished file only the chunks that are asked for."""
+    """Read only the chunks of a finished file that have these moments."""
     with path.open("rb") as stream:
         reader = make_reader(stream)
         found = reader.iter_messages(starting_at=first, ending_before=last)

@@ -93,7 +93,7 @@ class WriterProcess:
 
     @property
     def pid(self) -> int:
-        """Of the process."""
+        """Id of the process."""
         return self._process.pid
 
     async def feed(self, packed: Iterable[bytes]) -> None:
@@ -140,7 +140,7 @@ class WriterProcess:
         raise HopError("recordings", f"its process has ended: {code}")
 
     def _count(self, counts: dict[str, int]) -> None:
-        """What became of inputs since it began."""
+        """Count what became of inputs since it began."""
         fresh = Counter(counts) - self._answered
         self._answered = Counter(counts)
         for what, count in fresh.items():
@@ -216,7 +216,7 @@ class InputRecorder:
             self._write_down(record, type(record).__name__.removesuffix("Record"))
 
     def picture(self, payload: bytes, at: Instant) -> bool:
-        """What pages were sent; whether there is room for it."""
+        """Queue a picture of what pages were sent; whether there is room for it."""
         return self._is_on and self._queue(pack(Sort.PICTURE, at, payload=payload))
 
     def note_rule(self) -> None:
@@ -307,11 +307,11 @@ class InputRecorder:
 
     @property
     def pid(self) -> int | None:
-        """Of the process that writes; None while there is none."""
+        """Id of the process that writes; None while there is none."""
         return None if self._writer is None else self._writer.pid
 
     def take_waiting(self) -> Sequence[bytes]:
-        """What waits for the process that writes."""
+        """Take the inputs that wait for the process that writes."""
         waiting, self._waiting, self._bytes = self._waiting, [], 0
         return waiting
 

@@ -38,7 +38,7 @@ PICTURES_S: Final = 300.0
 
 @dataclass(frozen=True)
 class WriterSetup:
-    """What a writer is told at its beginning.
+    """Setup of a writer, told at its beginning.
 
     Attributes:
         folder: Of the recordings of inputs; pictures are in a folder of it.
@@ -63,7 +63,7 @@ class WriterSetup:
         return 2 * sum(one or RecordingLimits.most_bytes for one in kept)
 
     def directories(self) -> tuple[RecordingDirectory, RecordingDirectory]:
-        """Of inputs, and of pictures."""
+        """Directories of inputs and of pictures."""
         return (
             RecordingDirectory(self.folder, self.limits),
             RecordingDirectory(self.folder / "pictures", self.pictures),

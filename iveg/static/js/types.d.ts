@@ -387,7 +387,7 @@ export type Detector = {
   out_reason: string | null;
 };
 
-/** What one version of the rule did over a range. */
+/** Deeds of one version of the rule over a range. */
 export type Doings = {
   /** Reason → seconds of a robot at half speed. */
   slowed_s: Record<string, number>;
@@ -902,7 +902,7 @@ export type Scan = {
   points: [number, number][];
 };
 
-/** What a robot's laser sees near it and nothing explains, in ``map`` (m). */
+/** Obstacle that a robot's laser sees and nothing explains, in ``map`` (m). */
 export type SeenObstacle = {
   x: number;
   y: number;
@@ -1028,7 +1028,7 @@ export type Tile = {
   place: TilePlace | null;
 };
 
-/** What people call it, by language. */
+/** Name of a tile, by language. */
 export type TileName = {
   es: string;
   en: string;

@@ -93,7 +93,7 @@ _Id = Annotated[str, Field(pattern=r"^[ -~]{1,64}$")]
 
 
 class NoteRequest(BaseModel):
-    """What is to be noted; without a time it is about now."""
+    """A note to be kept; without a time it is about now."""
 
     model_config = ConfigDict(extra="forbid")
 

@@ -226,7 +226,7 @@ async def _kept(queries: Queries, command_id: str) -> Command | None:
 
 
 def _joined(followed: Command | None, kept: Command | None) -> Command | None:
-    """What goes on, beside what only the history tells: how it ended, and its steps."""
+    """Join a command of now with what only the history tells: outcome and steps."""
     if followed is None or kept is None:
         return followed or kept
     ended = {"outcome": kept.outcome, "was_loud": kept.was_loud, "steps": kept.steps}
@@ -253,7 +253,7 @@ def _robot(robot_id: str, stops: list[CommandLatency]) -> RobotLatency:
 
 
 def _by_transport(took: list[ByTransport]) -> dict[TransportId, LatencySpread]:
-    """Of each transport of the table, and of those that rows know besides."""
+    """Spread for each transport of the table, and for those that rows know besides."""
     known = dict.fromkeys(one.id for one in TRANSPORTS)
     known |= dict.fromkeys(transport for one in took for transport in one)
     return {
@@ -356,7 +356,7 @@ def router(read: ReadDay, pages: Pages, clock: Clock) -> APIRouter:
             HistoryDay | None, Query(description="Today unless told")
         ] = None,
     ) -> Response:
-        """What the fleet did on one day, Europe/Madrid, and what is due next."""
+        """Summary of one day of the fleet, Europe/Madrid, and what is due next."""
         now = clock().wall
         return Json(await read(day or in_madrid(now).date(), now))
 

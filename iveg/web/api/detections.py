@@ -125,7 +125,7 @@ Name = Annotated[str, Field(min_length=1, max_length=64)]
 
 
 class WordRequest(Body):
-    """What a detector's word stands for."""
+    """Meaning of a detector's word."""
 
     detector: Name
     word: Name

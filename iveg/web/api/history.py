@@ -76,7 +76,7 @@ class HistoryList(Generic[R]):
         return Listing[self.shape]  # type: ignore[name-defined]
 
     async def rows(self, records: Sequence[R]) -> list[tuple[Any, ...]]:
-        """What ``model`` is called with, for each record."""
+        """Arguments of ``model``, for each record."""
         if self.beside is None:
             return [(one,) for one in records]
         return list(zip(records, await self.beside(records), strict=True))

@@ -1,6 +1,6 @@
 """The paper's latency table, live, beside its own numbers (docs/interfaces/http.md).
 
-The latency table: read in the loop from streams of measures, written elsewhere.
+Streams of measures are read in the loop; the table is written elsewhere.
 """
 
 import asyncio

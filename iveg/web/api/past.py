@@ -1,7 +1,4 @@
-"""The world at any recorded moment (docs/interfaces/http.md, "The past").
-
-Recordings of what came in over HTTP (docs/interfaces/recordings.md).
-"""
+"""The past over HTTP: the world at any recorded moment, and recordings as files."""
 
 from collections.abc import Sequence
 from pathlib import Path
