@@ -1,1 +1,1 @@
-"""Parts that may fail by themselves, and nothing vital notices: history, map, messages, goals."""
+"""Parts that may fail, and nothing vital notices: history, map, messages, goals."""
