@@ -190,9 +190,7 @@ async def _directly(parts: Pipeline, told: list[Message]) -> dict[Spot, float]:
         "bench",
         robots,
         clock.now,
-        parts.ingest.enqueue,
-        parts.ingest.reject,
-        is_past=parts.ingest.is_past,
+        parts.ingest,
     )
     came: dict[Spot, float] = {}
     measures = [one.measure() for one in told]

@@ -20,10 +20,9 @@ import uvloop
 
 from benchmarks.fiware_ends import HOST
 from benchmarks.process import Usage, machine, pause, percentile, print_table
-from iveg.adapters.fleet_provisioning import provision
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.subscriptions import ensure_subscriptions, wanted_for
+from iveg.adapters.reconciler import ensure_subscriptions, provision, wanted_for
 from iveg.lab.embedded.server import embedded_fiware
 
 TENANT = ("agroconnect", "/greenhouse")

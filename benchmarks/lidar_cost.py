@@ -13,7 +13,7 @@ from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
-from iveg.ngsi.codec import write_scan
+from iveg.ngsi.codec import write_measure
 
 RATE_HZ = 30.0
 ROUNDS, REPEATS = 5, 200
@@ -37,7 +37,7 @@ def cost(work: Callable[[], object]) -> float:
 
 
 def message(rig: RobotHardware, world: SimulatedWorld) -> bytes:
-    return write_scan(rig.scan(world))
+    return write_measure(rig.scan(world))
 
 
 def main() -> None:

@@ -308,13 +308,4 @@ def _inputs(
         slots = {"source": source, "reason": reason}
         event_log.log(LogEvent("system", "log.rejected", slots), ports.clock())
 
-    is_robot = world.robots.__contains__
-    ingest = Ingest(
-        is_robot,
-        log_rejected,
-        world.is_past,
-        note_latency,
-        world.is_refused,
-        world.misplaced,
-    )
-    return latency, ingest
+    return latency, Ingest(world, note_latency, log_rejected)

@@ -144,6 +144,10 @@ def safety_report(
     )
 
 
+def ignore(*_: object) -> None:
+    """A listener to whom nothing matters."""
+
+
 def received(
     observation: Observation, *, after: float = 0.0, transport: TransportId = FIWARE.id
 ) -> Received:

@@ -93,7 +93,7 @@ MUTANTS = (
     ),
     Mutant(
         "STOP: the second copy of a refused release is judged anew",
-        "verdict = self._verdicts.on(order.attempt)",
+        "verdict = self._verdicts.get(order.attempt)",
         "verdict = None",
         ("unit/robot/test_safety.py",),
     ),
@@ -232,7 +232,7 @@ MUTANTS = (
     Mutant(
         "clear: whom a feedback does not name has no limit",
         "feedback.speed_limits.get(self._me, UNSUPERVISED)",
-        "feedback.speed_limits.get(self._me, SpeedLimit())",
+        "feedback.speed_limits.get(self._me, SpeedLimit(1.0))",
         ("unit/robot/test_feedback.py",),
     ),
     Mutant(
@@ -255,7 +255,7 @@ MUTANTS = (
     ),
     Mutant(
         "clear: a frame that cannot be read is as if it never came",
-        "return refused_frame(source, read) if name in _FRAMES else read",
+        "return _refused_frame(source, read) if name in _FRAMES else read",
         "return read",
         ("unit/ngsi",),
     ),

@@ -8,6 +8,7 @@ and neither people nor poses must vanish for that.
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Protocol
 
 from iveg.domain.kinds import KINDS, Kind, Scope
 from iveg.domain.observations import (
@@ -20,7 +21,6 @@ from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec, names
 
 Recorded = Callable[[str, bytes, Instant], None]
-IsEarly = Callable[[str, type[Observation], float], bool]
 _WIDER: Sequence[Scope] = ("off", "safety", "all")
 
 
@@ -47,15 +47,31 @@ class _Source:
     sparse: bool = True
 
 
+class Intake(Protocol):
+    """Takes what is read: the pipeline's, or one that draws for viewers."""
+
+    def is_past(
+        self, robot_id: str, kind: type[Observation], boot: str, seq: int
+    ) -> bool:
+        """Whether the identity of a message shows that it is no news."""
+
+    def is_early(self, robot_id: str, kind: type[Observation], now: float) -> bool:
+        """Whether a message comes too soon after one of its kind to be read."""
+
+    def enqueue(self, received: Received) -> None:
+        """Take an observation."""
+
+    def reject(self, source: str, reason: str, detail: str = "") -> None:
+        """Count what cannot be used."""
+
+
 class DirectReader:
     """Turns messages of robots into observations of the ``direct`` transport.
 
     Args:
-        enqueue: Where observations go; ``reject`` where the unreadable is counted.
+        intake: Where observations go and the unreadable is counted.
         scope: What is read; ``safety`` leaves poses, scans and intent to FIWARE.
-        is_past: Tells by its identity what FIWARE has already brought.
         recorded: Told of each message that is read: topic, payload, and when.
-        is_early: Whether a message comes too soon after one of its kind to be read.
     """
 
     def __init__(
@@ -63,21 +79,13 @@ class DirectReader:
         apikey: str,
         robots: Iterable[str],
         clock: Callable[[], Instant],
-        enqueue: Callable[[Received], None],
-        reject: Callable[[str, str, str], None],
+        intake: Intake,
         scope: Scope = "all",
-        is_past: codec.IsPast | None = None,
-        recorded: Recorded = lambda *_: None,
-        is_early: IsEarly = lambda *_: False,
+        recorded: Recorded | None = None,
     ) -> None:
-        self._clock = clock
-        self._enqueue = enqueue
-        self._reject = reject
-        self._is_past = is_past
-        self._recorded = recorded
+        self._clock, self._intake, self._recorded = clock, intake, recorded
         kinds = _read_in(scope)
         self._kinds = tuple(kind.of for kind in kinds)
-        self._is_early = is_early
         self._sources = {
             topic: source
             for robot_id in robots
@@ -88,9 +96,7 @@ class DirectReader:
         self, apikey: str, robot_id: str, kinds: Iterable[Kind]
     ) -> Iterator[tuple[str, _Source]]:
         """Topics of one robot."""
-        measure = partial(
-            codec.read_measure, is_past=self._is_past, instead=codec.UNREAD
-        )
+        measure = partial(codec.read_measure, is_past=self._intake.is_past)
         for kind in kinds:
             if kind.suffix is None:
                 continue
@@ -125,7 +131,7 @@ class DirectReader:
         """Count a message that the broker had retained: nobody knows how old it is."""
         source = self._sources.get(topic)
         if source is not None:
-            self._reject(source.robot_id, "retained", topic)
+            self._intake.reject(source.robot_id, "retained", topic)
 
     def read(self, topic: str, payload: bytes) -> None:
         """Take one message."""
@@ -134,14 +140,15 @@ class DirectReader:
             return
         at = self._clock()
         kind = source.kind
-        if kind is not None and self._is_early(source.robot_id, kind, at.mono):
+        if kind is not None and self._intake.is_early(source.robot_id, kind, at.mono):
             return
-        self._recorded(topic, payload, at)
+        if self._recorded is not None:
+            self._recorded(topic, payload, at)
         reading = source.read(payload)
         for problem in reading.problems:
-            self._reject(problem.source, problem.reason, problem.detail)
+            self._intake.reject(problem.source, problem.reason, problem.detail)
         for observation in reading.observations:
             if issubclass(kind_of(observation), self._kinds):
-                self._enqueue(
+                self._intake.enqueue(
                     Received(observation, at, DIRECT.id, sparse=source.sparse)
                 )

@@ -1,9 +1,7 @@
-"""HTTP to Orion and the IoT Agent: their headers, their pages, their failures.
+"""HTTP to Orion and the IoT Agent: their headers, pages, failures, and their bearer.
 
-The bearer that a PEP proxy before Orion and the agent asks for.
-
-One token for both, got at a token endpoint (OAuth 2.0; FIWARE Keyrock's
-``/oauth2/token``) before the first request::
+A PEP proxy before them may ask for a token.  One for both is got at a token endpoint
+(OAuth 2.0; FIWARE Keyrock's ``/oauth2/token``) before the first request::
 
     none ──ask──> held ──at 80 % of its life: asked for beside──> held anew
       ^             └──refused (401), or over──> asked for, and waited for
@@ -16,17 +14,18 @@ import asyncio
 import logging
 import socket
 import ssl
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from http import HTTPStatus
-from typing import Any, ClassVar, Final, Literal, Protocol, Self, TypeVar
+from typing import Any, ClassVar, Final, Literal, Self, TypeVar
 
 import httpx
 import orjson
+from pydantic import TypeAdapter, ValidationError
 
+from iveg.adapters.bounded_json import BoundedJson
 from iveg.domain.errors import HopError, NoAnswerError
-from iveg.domain.records import Json
 
 HOP: Final = "token"
 PART_OF_LIFE: Final = 0.8
@@ -38,34 +37,6 @@ _UNTOLD_S, _MOST_S, _MOST_CHARACTERS = 300.0, 86400.0, 16 * 1024
 _log = logging.getLogger(__name__)
 
 TokenHeader = Literal["Authorization", "X-Auth-Token"]
-
-
-class TokenAnswer(Protocol):
-    """What an endpoint says."""
-
-    @property
-    def body(self) -> Json:
-        """Its object; empty where there is none."""
-
-    @property
-    def is_success(self) -> bool:
-        """Whether it is one."""
-
-    @property
-    def refusal(self) -> str:
-        """Status and error code of one that is none."""
-
-
-class TokenHttp(Protocol):
-    """Asks an endpoint, bounded in time and size."""
-
-    async def post(
-        self, url: str, form: Mapping[str, str], login: tuple[str, str] | None = None
-    ) -> TokenAnswer:
-        """POST a form. Raises HopError."""
-
-    async def close(self) -> None:
-        """Close the connection."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +87,8 @@ class HeldToken:
     ends_at: float
 
 
-class FiwareToken:
-    """Gets the token and keeps it new.
+class FiwareToken(httpx.Auth):
+    """Gets the token, keeps it new, and sends requests with it.
 
     Args:
         grant: How it is asked for.
@@ -126,16 +97,45 @@ class FiwareToken:
     """
 
     def __init__(
-        self, grant: TokenGrant, mono: Callable[[], float], http: TokenHttp
+        self, grant: TokenGrant, mono: Callable[[], float], http: BoundedJson
     ) -> None:
         self._grant, self._mono, self._http = grant, mono, http
         self._held: HeldToken | None = None
-        self._asking: asyncio.Task[HeldToken] | None = None
-        self._error: HopError | None = None
+        self._asking: asyncio.Task[None] | None = None
+        self._error = ""
         self._pause_s, self._again_at = FIRST_PAUSE_S, float("-inf")
         self._refused_at = float("-inf")
 
-    async def current(self) -> str:
+    async def async_auth_flow(
+        self, request: httpx.Request
+    ) -> AsyncGenerator[httpx.Request, httpx.Response]:
+        """Send a request with a token; once more after a 401. Raises HopError.
+
+        What a proxy refused has not reached the neighbour: sent again, it comes once.
+        """
+        # A little less than the whole, so that it is known what was waited for.
+        patience_s = _TOKEN_PART * request.extensions["timeout"]["read"]
+        token = await self._in_time(patience_s)
+        response = yield self._carrying(request, token)
+        # Wilma says 401 also to whom it knows and gives no role: asking on for another
+        # token would help nobody.
+        if response.status_code == HTTPStatus.UNAUTHORIZED and self._drops(token):
+            yield self._carrying(request, await self._in_time(patience_s))
+
+    async def _in_time(self, patience_s: float) -> str:
+        try:
+            # Not `wait_for`, which in Python 3.11 may swallow a cancellation.
+            async with asyncio.timeout(patience_s):
+                return await self._current()
+        except TimeoutError as error:
+            raise HopError(HOP, "no answer yet") from error
+
+    def _carrying(self, request: httpx.Request, token: str) -> httpx.Request:
+        is_bearer = self._grant.header == "Authorization"
+        request.headers[self._grant.header] = f"Bearer {token}" if is_bearer else token
+        return request
+
+    async def _current(self) -> str:
         """A token that is not over. Raises HopError: there is none."""
         held, now = self._held, self._mono()
         if held is None or now >= held.ends_at:
@@ -145,24 +145,14 @@ class FiwareToken:
             self._ask()
         return held.text
 
-    async def after(self, refused: str) -> str | None:
-        """Another token than the one that a proxy has refused. Raises HopError.
-
-        None where the refused one is itself such another: Wilma says 401 also to whom
-        it knows and gives no role, and asking on would help nobody.
-        """
+    def _drops(self, refused: str) -> bool:
+        """Whether there may be another token than a refused one."""
         if self._held is not None and self._held.text == refused:
             now = self._mono()
             if now - self._refused_at < _REFUSED_S:
-                return None
+                return False
             self._held, self._refused_at = None, now
-        return await self.current()
-
-    def header(self, token: str) -> Mapping[str, str]:
-        """The header that carries a token."""
-        if self._grant.header == "Authorization":
-            return {"Authorization": f"Bearer {token}"}
-        return {self._grant.header: token}
+        return True
 
     async def close(self) -> None:
         """Close the connection to the endpoint."""
@@ -172,31 +162,33 @@ class FiwareToken:
         await self._http.close()
 
     async def _asked(self) -> str:
-        if self._asking is None and self._error and self._mono() < self._again_at:
-            raise HopError(HOP, self._error.detail)
-        # Who gives up takes the answer from nobody else.
-        return (await asyncio.shield(self._ask())).text
+        if self._mono() >= self._again_at or self._is_asking:
+            # Who gives up takes the answer from nobody else.
+            await asyncio.shield(self._ask())
+        if self._held is None or self._error:
+            raise HopError(HOP, self._error)
+        return self._held.text
 
-    def _ask(self) -> asyncio.Task[HeldToken]:
-        if self._asking is None:
-            self._asking = asyncio.create_task(self._fetch(), name="fiware-token")
-            self._asking.add_done_callback(self._settle)
+    @property
+    def _is_asking(self) -> bool:
+        return self._asking is not None and not self._asking.done()
+
+    def _ask(self) -> asyncio.Task[None]:
+        if self._asking is None or self._asking.done():
+            self._asking = asyncio.create_task(self._renew(), name="fiware-token")
         return self._asking
 
-    def _settle(self, task: asyncio.Task[HeldToken]) -> None:
-        self._asking = None
-        if task.cancelled():
-            return
-        error = task.exception()
-        if error is None:
-            self._held, self._error = task.result(), None
+    async def _renew(self) -> None:
+        try:
+            self._held = await self._fetch()
+        except HopError as error:
+            if not self._error:
+                _log.warning("no bearer for Orion and the agent: %s", error)
+            self._error, self._again_at = error.detail, self._mono() + self._pause_s
+            self._pause_s = min(LONGEST_PAUSE_S, 2 * self._pause_s)
+        else:
+            self._error = ""
             self._pause_s, self._again_at = FIRST_PAUSE_S, float("-inf")
-            return
-        if self._error is None:
-            _log.warning("no bearer for Orion and the agent: %s", error)
-        failure = error if isinstance(error, HopError) else HopError(HOP, repr(error))
-        self._error, self._again_at = failure, self._mono() + self._pause_s
-        self._pause_s = min(LONGEST_PAUSE_S, 2 * self._pause_s)
 
     async def _fetch(self) -> HeldToken:
         grant, began = self._grant, self._mono()
@@ -208,7 +200,7 @@ class FiwareToken:
         text = answer.body.get("access_token")
         if not isinstance(text, str) or not _is_token(text):
             raise HopError(HOP, "answered no token")
-        life_s = _life_of(answer)
+        life_s = _life_of(answer.body.get("expires_in"))
         return HeldToken(text, began + PART_OF_LIFE * life_s, began + life_s)
 
 
@@ -222,13 +214,13 @@ def _is_token(text: str) -> bool:
     )
 
 
-def _life_of(answer: TokenAnswer) -> float:
-    life = answer.body.get("expires_in")
-    if isinstance(life, str) and life.isdecimal():
-        life = int(life[:9])
-    if not isinstance(life, int | float) or isinstance(life, bool) or not life > 0:
-        return _UNTOLD_S
-    return min(float(life), _MOST_S)
+def _life_of(told: object) -> float:
+    """Life of a token (s), as far as it can be believed."""
+    try:
+        life = float(told) if isinstance(told, int | float | str) else 0.0
+    except ValueError:
+        life = 0.0
+    return min(life, _MOST_S) if life > 0 and told is not True else _UNTOLD_S
 
 
 _NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
@@ -249,6 +241,10 @@ _TOKEN_PART = 0.9
 
 Document = dict[str, Any]
 _T = TypeVar("_T")
+_OBJECT: TypeAdapter[Document] = TypeAdapter(Document)
+_OBJECTS: TypeAdapter[list[Document]] = TypeAdapter(list[Document])
+_NUMBER = TypeAdapter(int)
+MEANINGLESS = "answered JSON that means nothing here"
 
 
 @cache
@@ -267,7 +263,6 @@ class FiwareHttp:
         service: ``Fiware-Service``.
         path: ``Fiware-ServicePath``.
         access: Where a proxy before it asks for a token; None: none does.
-        bearer: Token that is sent along; empty for none.
 
     Attributes:
         HOP: Names the neighbour in errors.
@@ -283,10 +278,14 @@ class FiwareHttp:
         access: FiwareToken | None = None,
     ) -> None:
         self._access = access
-        headers = {"Fiware-Service": service, "Fiware-ServicePath": path}
         self._client = httpx.AsyncClient(
+            auth=access,
             base_url=url,
-            headers=headers,
+            headers={
+                "Accept": "application/json",
+                "Fiware-Service": service,
+                "Fiware-ServicePath": path,
+            },
             timeout=TIMEOUT_S,
             transport=httpx.AsyncHTTPTransport(
                 verify=_trusted(),
@@ -333,20 +332,17 @@ class FiwareHttp:
             NoAnswerError: no answer in time.
             HopError: no connection, no token for a proxy, or another status.
         """
-
-        async def send(token: Mapping[str, str]) -> httpx.Response:
-            return await self._client.request(
-                method,
-                path,
-                params=dict(query or {}),
-                json=body,
-                headers={"Accept": "application/json", **token},
-                timeout=timeout_s,
-            )
-
         try:
             async with asyncio.timeout(timeout_s):
-                response = await self._admitted(send, timeout_s)
+                response = await self._client.request(
+                    method,
+                    path,
+                    params=dict(query or {}),
+                    json=body,
+                    timeout=timeout_s,
+                )
+        except HopError as error:
+            raise HopError(self.HOP, f"{NO_TOKEN}: {error.detail}") from error
         except (TimeoutError, httpx.TimeoutException) as error:
             raise NoAnswerError(
                 self.HOP, f"no answer to {method} {path} in {timeout_s:g} s"
@@ -359,67 +355,26 @@ class FiwareHttp:
             return response
         raise HopError(self.HOP, _complaint(method, path, response))
 
-    async def _admitted(
-        self,
-        send: Callable[[Mapping[str, str]], Awaitable[httpx.Response]],
-        timeout_s: float,
-    ) -> httpx.Response:
-        """The answer with a token where one is asked for; once more after a 401.
+    def read_object(self, response: httpx.Response) -> Document:
+        """The object that is an answer. Raises HopError: it is anything else."""
+        return self._as(_OBJECT, self._json(response))
 
-        What a proxy refused has not reached the neighbour: sent again, it comes once.
-        """
-        if self._access is None:
-            return await send({})
-        token = await self._token(self._access.current(), timeout_s)
-        response = await send(self._access.header(token))
-        if response.status_code != HTTPStatus.UNAUTHORIZED:
-            return response
-        other = await self._token(self._access.after(token), timeout_s)
-        return response if other is None else await send(self._access.header(other))
+    def read_list(self, response: httpx.Response, part: str = "") -> list[Document]:
+        """The list of objects in an answer, or in one part of it. Raises HopError."""
+        found = self.read_object(response).get(part) if part else self._json(response)
+        return self._as(_OBJECTS, found)
 
-    async def _token(self, asked: Awaitable[_T], timeout_s: float) -> _T:
-        # A little less than the whole, so that it is known what was waited for.
-        try:
-            # Not `wait_for`, which in Python 3.11 may swallow a cancellation.
-            async with asyncio.timeout(_TOKEN_PART * timeout_s):
-                return await asked
-        except TimeoutError as error:
-            raise HopError(self.HOP, f"{NO_TOKEN}: no answer yet") from error
-        except HopError as error:
-            raise HopError(self.HOP, f"{NO_TOKEN}: {error.detail}") from error
-
-    def read(self, response: httpx.Response) -> object:
-        """The JSON of an answer.
-
-        Raises:
-            HopError: it is not JSON.
-        """
+    def _json(self, response: httpx.Response) -> object:
         try:
             return orjson.loads(response.content)
         except ValueError as error:
             raise HopError(self.HOP, "answered something that is not JSON") from error
 
-    def read_object(self, response: httpx.Response) -> Document:
-        """The object that is an answer.
-
-        Raises:
-            HopError: it is anything else.
-        """
-        document = self.read(response)
-        if not isinstance(document, dict):
-            raise self._meaningless()
-        return document
-
-    def read_list(self, response: httpx.Response, part: str = "") -> list[Document]:
-        """The list of objects in an answer, or in one part of it.
-
-        Raises:
-            HopError: it is anything else.
-        """
-        rows = self.read_object(response).get(part) if part else self.read(response)
-        if not isinstance(rows, list) or not all(isinstance(one, dict) for one in rows):
-            raise self._meaningless()
-        return rows
+    def _as(self, shape: TypeAdapter[_T], document: object) -> _T:
+        try:
+            return shape.validate_python(document)
+        except ValidationError as error:
+            raise HopError(self.HOP, MEANINGLESS) from error
 
     async def read_all(
         self, path: str, query: Mapping[str, str] = _COUNTED, part: str = ""
@@ -440,34 +395,23 @@ class FiwareHttp:
             response = await self.ask("GET", path, query=page)
             rows = self.read_list(response, part)
             found += rows
-            total = self._total(response, of_agent=bool(part))
-            if not rows or len(found) >= total:
+            about = self.read_object(response) if part else response.headers
+            total = about.get("count" if part else "Fiware-Total-Count", 0)
+            if not rows or len(found) >= self._as(_NUMBER, total):
                 break
         return found
-
-    def _total(self, response: httpx.Response, *, of_agent: bool) -> int:
-        """The total number, as the neighbour reports it."""
-        about = self.read_object(response) if of_agent else response.headers
-        counted = about.get("count" if of_agent else "Fiware-Total-Count", 0)
-        try:
-            return int(counted)
-        except (TypeError, ValueError) as error:
-            raise HopError(self.HOP, f"counted {counted!r} of something") from error
-
-    def _meaningless(self) -> HopError:
-        return HopError(self.HOP, "answered JSON that means nothing here")
 
 
 def _complaint(method: str, path: str, response: httpx.Response) -> str:
     """The reason of a refusal, short; each neighbour uses another word."""
-    said = ""
     try:
-        body = orjson.loads(response.content)
-    except ValueError:
-        body = None
-    if isinstance(body, dict):
-        # ``detail`` is a PEP proxy's.
-        words = ("description", "message", "detail")
-        said = next((str(body[one]) for one in words if body.get(one)), "")[:160]
+        body = _OBJECT.validate_json(response.content)
+    except ValidationError:
+        body = {}
+    # ``detail`` is a PEP proxy's.
+    words = [
+        str(body[w])[:160] for w in ("description", "message", "detail") if body.get(w)
+    ]
+    said = words[0] if words else ""
     refused = f"{response.status_code} to {method} {path}"
     return f"{refused}: {said}" if said else refused

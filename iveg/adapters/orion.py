@@ -1,17 +1,10 @@
-"""Orion: commands, and reads after a gap.
+"""Requests to Orion: commands, entities, subscriptions, registrations.
 
 Orion's 204 to a command proves nothing: it also answers so when the command went
 nowhere (docs/fiware.md).  The evidence is the robot's own answer.
-
-Stray entities that an agent made for unknown devices, and their removal.
-
-A measure of an unknown device makes an entity ``{type}:{device_id}``, such as
-``Robot:AGI_odom``: that happened while an agent with its registry in memory had
-forgotten our devices.
-Our group forbids that now (``autoprovision``); existing strays are removed here.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 
 from iveg.adapters.fiware_http import (
@@ -52,9 +45,8 @@ class OrionClient(FiwareHttp):
         Raises:
             HopError: Orion does not answer.
         """
-        answer = self.read(await self.ask("GET", "/version"))
-        about = answer.get("orion", {}) if isinstance(answer, dict) else {}
-        return str(about.get("version", "unknown"))
+        answer = self.read_object(await self.ask("GET", "/version"))
+        return str(answer.get("orion", {}).get("version", "unknown"))
 
     async def update_command(
         self,
@@ -86,27 +78,19 @@ class OrionClient(FiwareHttp):
             timeout_s=timeout_s,
         )
 
-    async def read_robots(self) -> list[dict[str, object]]:
+    async def read_robots(self) -> list[Document]:
         """Every robot that Orion knows, as ``ngsi.codec.read_entity`` takes them.
 
         Raises:
             HopError: Orion does not answer.
         """
-        return await self.read_entities(
-            names.ROBOT_TYPE, ROBOT_ATTRIBUTES, options="skipForwarding"
-        )
-
-    async def read_entities(
-        self, entity_type: str, attributes: Sequence[str], options: str = ""
-    ) -> list[Document]:
-        """Entities of a type, page by page.
-
-        Raises:
-            HopError: Orion does not answer.
-        """
-        asked = ",".join(part for part in (options, "count") if part)
-        query = {"type": entity_type, "attrs": ",".join(attributes), "orderBy": "id"}
-        return await self.read_all("/v2/entities", {**query, "options": asked})
+        query = {
+            "type": names.ROBOT_TYPE,
+            "attrs": ",".join(ROBOT_ATTRIBUTES),
+            "orderBy": "id",
+            "options": "skipForwarding,count",
+        }
+        return await self.read_all("/v2/entities", query)
 
     async def read_probe(self) -> Document | None:
         """The heartbeat probe as Orion has it; None where none ever came so far.
@@ -266,39 +250,3 @@ def _date_modified(entity: Document | None, attribute: str) -> float | None:
         return datetime.fromisoformat(text).timestamp()
     except (KeyError, TypeError, ValueError):
         return None
-
-
-_AT_ONCE = 50
-"""Ids in one question: an address has a longest length."""
-
-
-async def remove_orphans(
-    orion: OrionClient, devices: Mapping[str, Document], robots: Iterable[str]
-) -> list[str]:
-    """Remove the entities that no device of ours feeds; says which.
-
-    Args:
-        orion: Where they are.
-        devices: The agent's devices, by id, as they are now.
-        robots: The fleet.
-
-    Raises:
-        HopError: Orion does not answer.
-    """
-    fed = {str(one.get("entity_name")) for one in devices.values()}
-    strays = [one for one in _candidates(robots) if one not in fed]
-    removed = []
-    for start in range(0, len(strays), _AT_ONCE):
-        for entity_id, kind in await orion.find_entities(strays[start:][:_AT_ONCE]):
-            await orion.delete_entity(entity_id, kind)
-            removed.append(
-                f"Removed entity {entity_id}, which no device of ours feeds."
-            )
-    return removed
-
-
-def _candidates(robots: Iterable[str]) -> list[str]:
-    """Every name that an agent could have made up from our devices' ids."""
-    ids = [robot + device.suffix for robot in robots for device in names.ROBOT_DEVICES]
-    ids += [names.CLIMATE_DEVICE, names.HEARTBEAT_ID]
-    return [f"{names.ROBOT_TYPE}:{one}" for one in ids]

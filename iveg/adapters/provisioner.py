@@ -9,16 +9,18 @@ probe, a short question to Orion and to the agent, and the repairs.
 """
 
 import asyncio
+import contextlib
 import logging
 import random
-from collections.abc import Awaitable, Callable, Iterable, Sequence
-from typing import TypeVar
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass
 
-from iveg.adapters.fleet_provisioning import Provisioned, provision
+from iveg.adapters import clock
+from iveg.adapters.fiware_http import MEANINGLESS
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.subscriptions import Ensured, ensure_subscriptions, wanted_for
+from iveg.adapters.reconciler import ensure_subscriptions, provision, wanted_for
 from iveg.domain.equipment import Tile
 from iveg.domain.errors import HopError, NoAnswerError
 from iveg.domain.observations import HeartbeatProbe, Instant, Origin, Received
@@ -34,15 +36,32 @@ _LONGEST_DEVICES_WAIT_S = 32.0
 _DEVICES_EVERY = 3
 """While all is well, devices are looked at every third time."""
 
-T = TypeVar("T")
+
+@dataclass(frozen=True, slots=True)
+class FiwareSite:
+    """Facts of us that FIWARE should know.
+
+    Attributes:
+        robots: The fleet.
+        apikey: First part of every topic.
+        context_broker_url: Orion as the agent reaches it.
+        notify_url: Where Orion shall post.
+        notify_token: Secret that each notification carries.
+        boot: Of this start, in its probes.
+        tiles: Of other equipment.
+    """
+
+    robots: Sequence[str]
+    apikey: str
+    context_broker_url: str
+    notify_url: str
+    notify_token: str
+    boot: str
+    tiles: Sequence[Tile] = ()
 
 
 class Provisioner:
-    """Provisioning, subscriptions, reconciling reads and the heartbeat probe.
-
-    Args:
-        tiles: Of other equipment.
-    """
+    """Provisioning, subscriptions, reconciling reads and the heartbeat probe."""
 
     def __init__(
         self,
@@ -51,30 +70,11 @@ class Provisioner:
         link: MqttLink,
         health_monitor: HealthMonitor,
         ingest: Ingest,
-        *,
-        robots: Sequence[str],
-        apikey: str,
-        context_broker_url: str,
-        notify_url: str,
-        notify_token: str,
-        boot: str,
-        read_clock: Callable[[], Instant],
-        tiles: Sequence[Tile] = (),
+        site: FiwareSite,
     ) -> None:
-        self._orion = orion
-        self._agent = agent
-        self._link = link
-        self._health_monitor = health_monitor
-        self._ingest = ingest
-        self._robots = robots
-        self._tiles = tiles
-        self._apikey = apikey
-        self._context_broker_url = context_broker_url
-        self._notify_url = notify_url
-        self._notify_token = notify_token
-        self._boot = boot
-        self._clock = read_clock
-        self._probe_seq = 0
+        self._orion, self._agent, self._link = orion, agent, link
+        self._health_monitor, self._ingest, self._site = health_monitor, ingest, site
+        self._probe_seq = self._rounds = 0
         self._devices_at = self._devices_wait_s = 0.0
         self._paces = {"orion": Pace(), "iot_agent": Pace()}
         self._broken: set[str] = set()
@@ -113,84 +113,72 @@ class Provisioner:
 
     async def run(self) -> None:
         """Until cancelled."""
+        watch, repair = _ASK_PERIOD_S, _REPAIR_PERIOD_S
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._send_probes(), name="probe")
-            tasks.create_task(self._watch(self._ask_orion), name="watch-orion")
-            tasks.create_task(self._watch(self._ask_agent), name="watch-agent")
-            tasks.create_task(self._look_after(), name="look-after")
+            tasks.create_task(_repeat(self._ask_orion, watch), name="watch-orion")
+            tasks.create_task(_repeat(self._ask_agent, watch), name="watch-agent")
+            work = _repeat(self._repair, repair, self._gap)
+            tasks.create_task(work, name="look-after")
 
     # --- the heartbeat probe --------------------------------------------------------
 
     async def _send_probes(self) -> None:
         """At QoS 1: a broker that is there and does nothing says nothing either."""
-        topic = names.measure_topic(self._apikey, names.HEARTBEAT_ID)
+        topic = names.measure_topic(self._site.apikey, names.HEARTBEAT_ID)
         while True:
             if not self._link.connected:
                 self._health_monitor.mqtt_error = ""
                 await asyncio.sleep(0.1)
                 continue
             self._probe_seq += 1
-            now = self._clock()
+            now = clock.now()
             stamp = codec.format_stamp(now.wall)
-            origin = Origin(self._boot, self._probe_seq, stamp)
+            origin = Origin(self._site.boot, self._probe_seq, stamp)
             self._health_monitor.sent(origin, now)
-            self._health_monitor.mqtt_error = await self._publish(topic, origin)
-            spent = self._clock().mono - now.mono
+            complaint = ""
+            try:
+                await self._link.publish(topic, codec.write_heartbeat(origin))
+            except HopError:
+                complaint = "takes messages and does not confirm them"
+            self._health_monitor.mqtt_error = complaint
+            spent = clock.now().mono - now.mono
             await asyncio.sleep(max(0.1, PROBE_PERIOD_S - spent))
-
-    async def _publish(self, topic: str, origin: Origin) -> str:
-        """The broker's complaint about a probe; empty when it takes it."""
-        try:
-            await self._link.publish(topic, codec.write_heartbeat(origin))
-        except HopError:
-            return "takes messages and does not confirm them"
-        return ""
 
     # --- short questions ----------------------------------------------------------
 
-    async def _watch(self, ask: Callable[[], Awaitable[bool]]) -> None:
-        pause = _FIRST_PAUSE_S
-        while True:
-            if await ask():
-                pause = _FIRST_PAUSE_S
-                await asyncio.sleep(_ASK_PERIOD_S)
-            else:
-                await asyncio.sleep(_jittered(pause))
-                pause = min(_LONGEST_PAUSE_S, 2 * pause)
-
     async def _ask_orion(self) -> bool:
         """Prove that Orion answers, and how far the probe came."""
-        before = self._clock()
+        monitor, before = self._health_monitor, clock.now()
         try:
             entity = await self._orion.read_probe()
         except HopError as error:
-            self._health_monitor.orion_error = error.detail
+            monitor.orion_error = error.detail
             return self._tell("orion", error)
-        at = self._clock()
-        self._health_monitor.orion_ok_at = at.mono
-        self._health_monitor.orion_slow = self._slow("orion", at.mono - before.mono)
-        for observation in codec.read_entity(entity).observations if entity else ():
+        at = clock.now()
+        monitor.orion_ok_at = at.mono
+        monitor.orion_slow = self._slow("orion", at.mono - before.mono)
+        for observation in codec.read_entity(entity or {}).observations:
             if isinstance(observation, HeartbeatProbe):
-                self._health_monitor.stored(observation.origin)
-        if self._health_monitor.orion_error:
-            self._health_monitor.orion_error = ""
-            self._health_monitor.orion_back_at = at.mono
+                monitor.stored(observation.origin)
+        if monitor.orion_error:
+            monitor.orion_error, monitor.orion_back_at = "", at.mono
             self._gap.set()
         return self._tell("orion", None)
 
     async def _ask_agent(self) -> bool:
-        before = self._clock()
+        monitor, before = self._health_monitor, clock.now()
         try:
             await self._agent.version()
         except HopError as error:
             is_silent = isinstance(error, NoAnswerError)
-            self._health_monitor.agent_silent = error.detail if is_silent else ""
-            self._health_monitor.agent_error = "" if is_silent else error.detail
+            monitor.agent_silent = error.detail if is_silent else ""
+            monitor.agent_error = "" if is_silent else error.detail
             return self._tell("iot_agent", error)
-        spent = self._clock().mono - before.mono
-        self._health_monitor.agent_slow = self._slow("iot_agent", spent)
+        spent = clock.now().mono - before.mono
+        monitor.agent_slow = self._slow("iot_agent", spent)
         if self._agent_trouble:
-            self._health_monitor.agent_error = self._health_monitor.agent_silent = ""
+            monitor.agent_error = monitor.agent_silent = ""
             self._devices_wait_s = self._devices_at = 0.0
             self._gap.set()
         return self._tell("iot_agent", None)
@@ -207,137 +195,106 @@ class Provisioner:
 
     # --- devices, subscriptions, reads --------------------------------------------
 
-    async def _look_after(self) -> None:
-        """Repair for ever; sooner after a gap, ever later while it does not succeed."""
-        rounds, pause = 0, _FIRST_PAUSE_S
-        while True:
-            self._gap.clear()
-            devices = self._devices_are_due(rounds, self._clock())
-            rounds += 1
-            if await self._repair(devices=devices):
-                pause = _FIRST_PAUSE_S
-                await self._rest(_REPAIR_PERIOD_S)
-            else:
-                await self._rest(_jittered(pause))
-                pause = min(_LONGEST_PAUSE_S, 2 * pause)
-
-    def _devices_are_due(self, rounds: int, now: Instant) -> bool:
-        """Never while the agent falls behind: the questions would queue there too."""
-        if self._health_monitor.is_overloaded(now) or now.mono < self._devices_at:
-            return False
-        return rounds % _DEVICES_EVERY == 0 or not self._health_monitor.whole(now)
-
-    async def _rest(self, seconds: float) -> None:
-        """Sleep, unless a neighbour comes back meanwhile."""
-        try:
-            async with asyncio.timeout(seconds):
-                await self._gap.wait()
-        except TimeoutError:
-            return
-
-    async def _repair(self, *, devices: bool) -> bool:
+    async def _repair(self) -> bool:
         """Devices, then subscriptions, then the read that fills the gap.
 
         Orion sends nothing when a subscription is made, so the read comes last.
         """
+        self._gap.clear()
+        devices = self._devices_are_due(clock.now())
+        self._rounds += 1
         if self._health_monitor.orion_error:
             return False
-        whole = True
+        is_whole = True
         if devices and not self._agent_trouble:
-            whole = await self._check_devices()
-        whole = await self._check_subscriptions() and whole
-        return await self._reconcile() and whole and not self._agent_trouble
+            is_whole = await self._try("devices", "iot_agent", self._check_devices)
+        for what, work in (
+            ("subscriptions", self._check_subscriptions),
+            ("reading", self._read_robots),
+        ):
+            is_whole = await self._try(what, "orion", work) and is_whole
+        return is_whole and not self._agent_trouble
 
-    async def _check_devices(self) -> bool:
-        work = provision(
+    def _devices_are_due(self, now: Instant) -> bool:
+        """Never while the agent falls behind: the questions would queue there too."""
+        if self._health_monitor.is_overloaded(now) or now.mono < self._devices_at:
+            return False
+        is_turn = self._rounds % _DEVICES_EVERY == 0
+        return is_turn or not self._health_monitor.whole(now)
+
+    async def _try(
+        self, what: str, hop: str, work: Callable[[], Awaitable[None]]
+    ) -> bool:
+        """Do one part; a neighbour that is down was reported already."""
+        try:
+            await work()
+        except HopError as error:
+            failure = error
+        except (AttributeError, KeyError, TypeError, ValueError):
+            # The shape of a neighbour's JSON is known only by use.
+            failure = HopError(hop, MEANINGLESS)
+        else:
+            return self._tell(what, None)
+        if what == "devices":
+            self._health_monitor.agent_warning = failure.detail
+            if isinstance(failure, NoAnswerError):
+                # Repeated ever later: the question may still be queued.
+                longer = max(_REPAIR_PERIOD_S, 2 * self._devices_wait_s)
+                self._devices_wait_s = min(_LONGEST_DEVICES_WAIT_S, longer)
+                self._devices_at = clock.now().mono + self._devices_wait_s
+        elif what == "subscriptions":
+            self._health_monitor.notify_error = failure.detail
+        ask = self._ask_agent if failure.hop == "iot_agent" else self._ask_orion
+        return await ask() and self._tell(what, failure)
+
+    async def _check_devices(self) -> None:
+        site = self._site
+        done = await provision(
             self._agent,
             self._orion,
-            robots=self._robots,
-            apikey=self._apikey,
-            cbroker_url=self._context_broker_url,
-            tiles=self._tiles,
+            robots=site.robots,
+            apikey=site.apikey,
+            cbroker_url=site.context_broker_url,
+            tiles=site.tiles,
         )
-        try:
-            done: Provisioned = await _made_sense("iot_agent", work)
-        except HopError as error:
-            self._health_monitor.agent_warning = error.detail
-            if isinstance(error, NoAnswerError):
-                self._wait_longer()
-            return await self._blame("devices", error)
         self._devices_wait_s = self._devices_at = 0.0
-        self._explain(done.mended)
-        self._warn(done.problems)
-        return self._tell("devices", None)
+        _explain(done.mended)
+        # What only a person can mend stands on the health page while it lasts.
+        self._health_monitor.agent_warning = _in_short(done.problems)
+        for sentence in done.problems:
+            if sentence not in self._warned:
+                _log.warning("%s", sentence)
+        self._warned = frozenset(done.problems)
 
-    def _wait_longer(self) -> None:
-        """Repeat an unanswered question ever later: it may still be queued."""
-        longer = max(_REPAIR_PERIOD_S, 2 * self._devices_wait_s)
-        self._devices_wait_s = min(_LONGEST_DEVICES_WAIT_S, longer)
-        self._devices_at = self._clock().mono + self._devices_wait_s
-
-    async def _check_subscriptions(self) -> bool:
-        work = ensure_subscriptions(
-            self._orion,
-            self._notify_url,
-            self._notify_token,
-            wanted_for(self._tiles),
-        )
+    async def _check_subscriptions(self) -> None:
+        site, monitor = self._site, self._health_monitor
         self._is_subscribing = True
         try:
-            done: Ensured = await _made_sense("orion", work)
-        except HopError as error:
-            self._health_monitor.notify_error = error.detail
-            return await self._blame("subscriptions", error)
+            done = await ensure_subscriptions(
+                self._orion, site.notify_url, site.notify_token, wanted_for(site.tiles)
+            )
         finally:
             self._is_subscribing = False
-        first = not self._subscription_ids
+        # What is made at the start was never missed.
+        missed = _in_short(done.mended) if self._subscription_ids else ""
         self._subscription_ids = done.ids
         self._former_ids |= done.former_ids
         self._former_secrets |= done.former_secrets
-        self._explain(done.mended)
-        self._health_monitor.notify_detail = done.failing
-        # What is made at the start was never missed.
-        missed = "" if first else _in_short(done.mended)
-        self._health_monitor.notify_error = missed
-        trouble = HopError("notifications", missed) if missed else None
-        return self._tell("subscriptions", trouble)
-
-    async def _reconcile(self) -> bool:
-        """Read all robots, to restore what a gap has lost."""
-        try:
-            await _made_sense("orion", self._read_robots())
-        except HopError as error:
-            return await self._blame("reading", error)
-        return self._tell("reading", None)
-
-    async def _blame(self, what: str, error: HopError) -> bool:
-        """Report a failure; a neighbour that is down was reported already."""
-        ask = self._ask_agent if error.hop == "iot_agent" else self._ask_orion
-        return await ask() and self._tell(what, error)
+        _explain(done.mended)
+        monitor.notify_detail, monitor.notify_error = done.failing, missed
+        if missed:
+            raise HopError("notifications", missed)
 
     async def _read_robots(self) -> None:
+        """Read all robots, to restore what a gap has lost."""
         entities = await self._orion.read_robots()
-        at = self._clock()
+        at = clock.now()
         for entity in entities:
             for observation in codec.read_entity(entity).observations:
-                if observation.robot_id in self._robots:
+                if observation.robot_id in self._site.robots:
                     self._ingest.enqueue(
                         Received(observation, at, FIWARE.id, asked=True)
                     )
-
-    # --- log ----------------------------------------------------------------------
-
-    def _explain(self, mended: Iterable[str]) -> None:
-        for sentence in mended:
-            _log.info("%s", sentence)
-
-    def _warn(self, problems: Sequence[str]) -> None:
-        """Show what only a person can mend on the health page, while it lasts."""
-        self._health_monitor.agent_warning = _in_short(problems)
-        for sentence in problems:
-            if sentence not in self._warned:
-                _log.warning("%s", sentence)
-        self._warned = frozenset(problems)
 
     def _tell(self, what: str, error: HopError | None) -> bool:
         """Log a loss once and a return once; says whether all is well."""
@@ -350,18 +307,29 @@ class Provisioner:
         return error is None
 
 
-async def _made_sense(hop: str, work: Awaitable[T]) -> T:
-    """Run the reader of a neighbour's JSON, whose shape is known only by use."""
-    try:
-        return await work
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise HopError(hop, "answered JSON that means nothing here") from error
+async def _repeat(
+    work: Callable[[], Awaitable[bool]],
+    period_s: float,
+    gap: asyncio.Event | None = None,
+) -> None:
+    """For ever: sooner after a gap, ever later while it does not succeed."""
+    pause = _FIRST_PAUSE_S
+    while True:
+        if await work():
+            pause, rest_s = _FIRST_PAUSE_S, period_s
+        else:
+            rest_s = pause * random.uniform(0.5, 1.0)  # noqa: S311 - jitter, no secret
+            pause = min(_LONGEST_PAUSE_S, 2 * pause)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(rest_s):
+                await (gap or asyncio.Event()).wait()
+
+
+def _explain(mended: Sequence[str]) -> None:
+    for sentence in mended:
+        _log.info("%s", sentence)
 
 
 def _in_short(sentences: Sequence[str]) -> str:
     more = f" And {len(sentences) - 1} more." if len(sentences) > 1 else ""
     return sentences[0] + more if sentences else ""
-
-
-def _jittered(pause_s: float) -> float:
-    return pause_s * random.uniform(0.5, 1.0)  # noqa: S311 - jitter, no secret

@@ -34,30 +34,32 @@ class MqttTransport:
 
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
         """Publish a STOP, never retained; returns when the broker has it."""
-        topic = names.command_topic(self._apikey, robot_id)
-        payload = codec.write_command(codec.write_stop(hold_id, by))
-        await self._link.publish(topic, payload, qos=1)
+        await self._order(robot_id, codec.write_stop(hold_id, by), qos=1)
 
     async def release(
         self, robot_id: str, ids: Iterable[str], challenge: str, attempt: str
     ) -> None:
         """Publish a release, once."""
-        await self._once(robot_id, codec.write_release(ids, challenge, attempt))
+        await self._order(robot_id, codec.write_release(ids, challenge, attempt))
 
     async def resume(self, robot_id: str, challenge: str, attempt: str) -> None:
         """Publish a resume, once."""
-        await self._once(robot_id, codec.write_resume(challenge, attempt))
+        await self._order(robot_id, codec.write_resume(challenge, attempt))
 
     async def goal(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
         """Publish a goal or its cancellation, once."""
-        topic = names.command_topic(self._apikey, robot_id)
-        payload = codec.write_command(codec.write_goal(order), names.GOAL)
-        await self._link.publish(topic, payload, qos=0)
+        await self._order(robot_id, codec.write_goal(order), names.GOAL)
 
-    async def _once(self, robot_id: str, value: Mapping[str, object]) -> None:
-        """Publish at QoS 0: no client sends it again after a lost connection."""
+    async def _order(
+        self,
+        robot_id: str,
+        value: Mapping[str, object],
+        name: str = names.COMMAND,
+        qos: int = 0,
+    ) -> None:
+        """Publish; at QoS 0 no client sends it again after a lost connection."""
         topic = names.command_topic(self._apikey, robot_id)
-        await self._link.publish(topic, codec.write_command(value), qos=0)
+        await self._link.publish(topic, codec.write_command(value, name), qos=qos)
 
     async def set_desired_state(
         self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
@@ -82,15 +84,18 @@ class OrionTransport:
         self, robot_id: str, ids: Iterable[str], challenge: str, attempt: str
     ) -> None:
         """Ask for a release, once."""
-        value = codec.write_release(ids, challenge, attempt)
-        await self._orion.update_command(robot_id, value)
+        await self._orion.update_command(
+            robot_id, codec.write_release(ids, challenge, attempt)
+        )
 
     async def resume(self, robot_id: str, challenge: str, attempt: str) -> None:
         """Ask for a resume, once."""
-        value = codec.write_resume(challenge, attempt)
-        await self._orion.update_command(robot_id, value)
+        await self._orion.update_command(
+            robot_id, codec.write_resume(challenge, attempt)
+        )
 
     async def goal(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
         """Ask for a goal or its cancellation, once."""
-        value = codec.write_goal(order)
-        await self._orion.update_command(robot_id, value, name=names.GOAL)
+        await self._orion.update_command(
+            robot_id, codec.write_goal(order), name=names.GOAL
+        )

@@ -19,7 +19,7 @@ from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.loop_watch import LoopWatch
 from iveg.adapters.messages import AppriseSender, load_messages
-from iveg.adapters.provisioner import Provisioner
+from iveg.adapters.provisioner import FiwareSite, Provisioner
 from iveg.adapters.recordings.pictures import PictureFiles
 from iveg.adapters.recordings.recorder import PART as RECORDINGS
 from iveg.adapters.recordings.recorder import RecordedSink
@@ -45,7 +45,7 @@ from iveg.vital.audit import AuditTrail
 from iveg.web.build import Face
 from iveg.web.live.encoder import Encoder
 from iveg.web.live.pictures import Past, PictureRecorder
-from iveg.web.notifications import NotificationEndpoint
+from iveg.web.notifications import Followers, NotificationEndpoint
 from iveg.web.pages import sentences
 from iveg.web.pages.contexts import Site
 from iveg.web.security.secrets import NotifySecret
@@ -164,12 +164,9 @@ class Dss:
             self.settings.apikey,
             self.fleet.ids,
             clock.now,
-            ingest.enqueue,
-            ingest.reject,
+            ingest,
             self.settings.direct_read,
-            ingest.is_past,
             self.pipeline.supervision.guard(RECORDINGS, self.stores.inputs.measure),
-            ingest.is_early,
         )
         self.outside.link.attach(
             {},
@@ -188,14 +185,15 @@ class Dss:
             outside.link,
             parts.health_monitor,
             parts.ingest,
-            robots=self.fleet.ids,
-            apikey=settings.apikey,
-            context_broker_url=settings.iota_cb_url or settings.orion_url,
-            notify_url=settings.notify_address,
-            notify_token=self.notify_secret.current,
-            boot=self._boot,
-            read_clock=clock.now,
-            tiles=parts.equipment.equipment.tiles,
+            FiwareSite(
+                self.fleet.ids,
+                settings.apikey,
+                context_broker_url=settings.iota_cb_url or settings.orion_url,
+                notify_url=settings.notify_address,
+                notify_token=self.notify_secret.current,
+                boot=self._boot,
+                tiles=parts.equipment.equipment.tiles,
+            ),
         )
 
     def _face(self) -> Face:
@@ -207,13 +205,14 @@ class Dss:
             parts.ingest,
             self.notify_secret,
             clock.now,
-            self.provisioner.is_ours,
+            self.provisioner,
             (settings.fiware_service, settings.fiware_servicepath),
-            self._notified,
-            parts.equipment.equipment.entities,
-            parts.supervision.guard(EQUIPMENT, parts.equipment.receive),
-            parts.supervision.guard(RECORDINGS, self.stores.inputs.notification),
-            self.provisioner.is_former,
+            Followers(
+                self._notified,
+                parts.equipment.equipment.entities,
+                parts.supervision.guard(EQUIPMENT, parts.equipment.receive),
+                parts.supervision.guard(RECORDINGS, self.stores.inputs.notification),
+            ),
         )
         site = Site(
             parts.evaluator.greenhouse.name,

@@ -17,10 +17,9 @@ from iveg.adapters.database_check import check_database
 from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.fiware_http import FiwareHttp
 from iveg.adapters.fleet_files import load_fleet
-from iveg.adapters.fleet_provisioning import provision
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.mqtt import publish_and_hear
-from iveg.adapters.subscriptions import PREFIX, describe_failures
+from iveg.adapters.reconciler import PREFIX, describe_failures, provision
 from iveg.app.fiware import open_fiware
 from iveg.cli.arguments import CommandCall
 from iveg.cli.nodes import broker_of

@@ -28,7 +28,7 @@ from iveg.cli.user import invitation_link
 from iveg.domain.errors import HopError
 from iveg.settings import Settings
 from iveg.web.bounded_http import bounded_http
-from iveg.web.live.bounded import BoundedSocket
+from iveg.web.live.socket import BoundedSocket
 from iveg.web.notifications import NotificationsFirst
 
 _log = logging.getLogger(__name__)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final, Literal
 
 from iveg.domain.comparison import Comparison
-from iveg.domain.limits import LIMITS, grown_radius
+from iveg.domain.limits import grown_radius
 from iveg.domain.parameters import PARAMETERS, Class, Parameters
 from iveg.domain.words import meaning_of, plain
 
@@ -105,11 +105,7 @@ class DetectionRule(Parameters):
 
     def radius_at(self, age_s: float, class_: Class) -> float:
         """The zone of a sighting of this class that is ``age_s`` old (m)."""
-        radius_m = self.radius_m.of(class_)
-        if age_s <= LIMITS.growth_grace_s:
-            # Fast path: most are fresh; this runs thousands of times a second.
-            return radius_m
-        return grown_radius(radius_m, age_s)
+        return grown_radius(self.radius_m.of(class_), age_s)
 
 
 def strictest(rules: Iterable[DetectionRule], since: float) -> DetectionRule:

@@ -6,16 +6,40 @@ alive and the speed limits of the whole fleet (docs/interfaces/mqtt.md).
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Annotated
+
+from pydantic import BeforeValidator, Field, Strict
 
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Origin
 from iveg.domain.parameters import Class, Sent
+from iveg.domain.wire import (
+    IF_ANY,
+    MAX_BOXES,
+    MAX_ROBOTS,
+    Flag,
+    Metres,
+    Seconds,
+    Share,
+    Speed,
+    Text,
+    digits,
+    place,
+)
 
 FULL_SPEED = 1.0
 LONGEST_BACKLOG_S = 60.0
 HALF_SPEED = LIMITS.slow_factor
 """The factor inside a zone; a constant of the paper, not a setting."""
+
+
+Radius = Annotated[float, Strict(), Field(gt=0, le=100), digits(4)]
+Distance = Annotated[float, Strict(), Field(ge=0, le=1e7), digits(4)]
+
+
+def _or_empty(text: object) -> object:
+    return "" if text is None else text
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,15 +53,15 @@ class FeedbackAlert:
             so nobody knows.
     """
 
-    decision_id: str
-    stamp: str
-    class_: Class | None = None
-    class_id: str | None = None
-    confidence: float | None = None
-    position: tuple[float, float, float] | None = None
-    radius_m: float | None = None
-    observer: str | None = None
-    velocity: tuple[float, float] | None = None
+    decision_id: Annotated[Text, BeforeValidator(_or_empty), IF_ANY] = ""
+    stamp: Annotated[Text, BeforeValidator(_or_empty)] = ""
+    class_: Annotated[Class | None, Field(alias="class")] = None
+    class_id: Text | None = None
+    confidence: Annotated[Share | None, Field(alias="conf")] = None
+    position: Annotated[tuple[Metres, Metres, Metres], *place("xyz")] | None = None
+    radius_m: Radius | None = None
+    observer: Text | None = None
+    velocity: Annotated[tuple[Speed, Speed], *place("xy")] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,16 +79,16 @@ class SpeedLimit:
             robot judges itself.
     """
 
-    speed_factor: float = FULL_SPEED
-    reason: str = "clear"
-    cause: str | None = None
-    distance_m: float | None = None
-    decision_id: str | None = None
-    foretold_s: float | None = None
-    over: bool = False
+    speed_factor: Annotated[float, Strict(), Field(ge=0, le=1)]
+    reason: Text = "clear"
+    cause: Text | None = None
+    distance_m: Distance | None = None
+    decision_id: Text | None = None
+    foretold_s: Seconds | None = None
+    over: Annotated[Flag, IF_ANY] = False
 
 
-CLEAR = SpeedLimit()
+CLEAR = SpeedLimit(FULL_SPEED)
 UNSUPERVISED = SpeedLimit(HALF_SPEED, "unsupervised")
 """Of a robot that nobody has judged, or that a feedback does not name."""
 
@@ -86,15 +110,19 @@ class Feedback:
         rule: Values of the rule that robots judge by themselves.
     """
 
-    robot_id: str
+    robot_id: Text
     origin: Origin
     alert: FeedbackAlert | None = None
-    alerts: tuple[FeedbackAlert, ...] = ()
+    alerts: Annotated[tuple[FeedbackAlert, ...], Field(max_length=MAX_BOXES)] = ()
     pose: Pose2D | None = None
     twist: Twist2D | None = None
-    pose_stamp: str | None = None
-    speed_limits: Mapping[str, SpeedLimit] = field(default_factory=dict)
-    seen: Mapping[str, int] = field(default_factory=dict)
+    pose_stamp: Text | None = None
+    speed_limits: Annotated[Mapping[str, SpeedLimit], Field(max_length=MAX_ROBOTS)] = (
+        field(default_factory=dict)
+    )
+    seen: Annotated[
+        Mapping[str, Annotated[int, Strict()]], Field(max_length=MAX_ROBOTS)
+    ] = field(default_factory=dict)
     backlog_s: float | None = None
-    foresight: bool = False
+    foresight: Flag = False
     rule: Sent = field(default_factory=dict)

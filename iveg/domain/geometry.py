@@ -6,6 +6,11 @@ in B": the robot's pose in ``map``, the laser's pose in ``base_link``.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
+
+from iveg.domain.wire import Metres, Radians, Speed, digits
 
 
 def wrap_angle(angle: float) -> float:
@@ -17,9 +22,9 @@ def wrap_angle(angle: float) -> float:
 class Pose2D:
     """Position (m) and heading (rad) of one frame in another."""
 
-    x: float
-    y: float
-    yaw: float
+    x: Metres
+    y: Metres
+    yaw: Annotated[Radians, digits(5)]
 
     def transform(self, x: float, y: float) -> tuple[float, float]:
         """Take a point from the inner frame to the outer one."""
@@ -54,23 +59,23 @@ class Pose2D:
 class Twist2D:
     """Velocity: ``linear_x`` (m/s, forward) and ``angular_z`` (rad/s)."""
 
-    linear_x: float
-    angular_z: float
+    linear_x: Annotated[Speed, Field(alias="linear_velocity")] = 0.0
+    angular_z: Annotated[Speed, Field(alias="angular_velocity")] = 0.0
 
 
-REST = Twist2D(0.0, 0.0)
+REST = Twist2D()
 
 
 @dataclass(frozen=True, slots=True)
 class Box3D:
     """An axis-aligned box (m) in the frame that its owner names."""
 
-    xmin: float
-    xmax: float
-    ymin: float
-    ymax: float
-    zmin: float
-    zmax: float
+    xmin: Metres
+    xmax: Metres
+    ymin: Metres
+    ymax: Metres
+    zmin: Metres
+    zmax: Metres
 
     @property
     def centre(self) -> tuple[float, float, float]:

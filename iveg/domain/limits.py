@@ -6,15 +6,10 @@ here, the pages through values that the server writes into each
 Numbers of an algorithm that nobody outside of it relies on stay where the algorithm is.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TypeVar
 
 _Number = TypeVar("_Number", int, float)
-_OneOrMany = TypeVar("_OneOrMany", float, NDArray[np.float64])
 
 
 def _limit(value: _Number, unit: str, source: str, says: str) -> _Number:
@@ -169,18 +164,11 @@ class SafetyLimits:
 LIMITS = SafetyLimits()
 
 
-def grown_radius(
-    radius_m: float,
-    age_s: _OneOrMany,
-    least: Callable[..., Any] = min,
-    most: Callable[..., Any] = max,
-) -> _OneOrMany:
+def grown_radius(radius_m: float, age_s: float) -> float:
     """Radius of the zone of a sighting that is ``age_s`` old (m).
 
     It keeps its size for as long as a healthy way takes, grows as fast as a person
-    walks, and never shrinks.  ``numpy.minimum`` and ``numpy.maximum`` as ``least`` and
-    ``most`` judge an array of ages.
+    walks, and never shrinks.
     """
-    walked = LIMITS.walking_m_s * most(0.0, age_s - LIMITS.growth_grace_s)
-    grown: _OneOrMany = most(radius_m, least(LIMITS.zone_most_m, radius_m + walked))
-    return grown
+    walked = LIMITS.walking_m_s * max(0.0, age_s - LIMITS.growth_grace_s)
+    return max(radius_m, min(LIMITS.zone_most_m, radius_m + walked))

@@ -1,19 +1,42 @@
 """Observations: frozen values, each with its robot, its order and its age.
 
-The field names are those of ``nav_msgs``, ``sensor_msgs`` and the NGSI entity; times
-are Unix seconds unless said otherwise.
+Each is the one declaration of its message: names on the wire, bounds and digits stand
+at its members.  Names are those of ``nav_msgs``, ``sensor_msgs`` and the NGSI entity;
+times are Unix seconds unless said otherwise.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, Strict
 
 from iveg.domain.geometry import Box3D, Pose2D, Twist2D
-from iveg.domain.quantities import quantity
+from iveg.domain.quantities import Quantity
 from iveg.domain.transports import FIWARE, TransportId
+from iveg.domain.wire import (
+    IF_ANY,
+    IN_MESSAGE,
+    MAX_PATH,
+    MAX_TEXT,
+    OR_NONE,
+    Count,
+    Flag,
+    MaxRange,
+    Metres,
+    Radians,
+    Seconds,
+    Share,
+    Speed,
+    Text,
+    digits,
+    one_of,
+    place,
+)
+
+MOST_HEARD_ALSO = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +58,8 @@ class Instant:
 class FeedbackRef:
     """One feedback message of iVeg: its boot, and its place in the count."""
 
-    boot: str
-    seq: int
+    boot: Text
+    seq: Count
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,15 +79,17 @@ class Origin:
             only recordings of one frame meet.  None: a live robot says this.
     """
 
-    boot: str | None = None
-    seq: int | None = None
-    stamp: str | None = None
+    boot: Text | None = None
+    seq: Count | None = None
+    stamp: Text | None = None
     stamp_s: float | None = None
-    mono: float | None = None
+    mono: Seconds | None = None
     acknowledgements: bool = False
     heard: FeedbackRef | None = None
-    heard_also: tuple[FeedbackRef, ...] = ()
-    replay: str | None = None
+    heard_also: Annotated[
+        tuple[FeedbackRef, ...], Field(max_length=MOST_HEARD_ALSO)
+    ] = ()
+    replay: Text | None = None
 
     @property
     def echoes(self) -> tuple[FeedbackRef, ...]:
@@ -93,8 +118,18 @@ class Observation:
         origin: Which of its messages it was.
     """
 
+    __pydantic_config__ = ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False)
+
     robot_id: str
     origin: Origin
+
+
+def _or_none(text: str | None) -> str | None:
+    return text or None
+
+
+FrameName = Annotated[Text, AfterValidator(_or_none)]
+"""As sent; empty: none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,9 +140,9 @@ class Odometry(Observation):
         frame_id: Of the pose, as sent; None: without one, which is ``map``.
     """
 
-    pose: Pose2D
-    twist: Twist2D
-    frame_id: str | None = None
+    pose: Annotated[Pose2D, IN_MESSAGE]
+    twist: Annotated[Twist2D, IN_MESSAGE]
+    frame_id: Annotated[FrameName | None, IF_ANY] = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,11 +158,11 @@ class LaserScan(Observation):
         ranges: Shape (n,), float32 (m); ``inf`` where nothing came back.
     """
 
-    angle_min: float
-    angle_increment: float
-    range_min: float
-    range_max: float
-    mount: Pose2D
+    angle_min: Radians
+    angle_increment: Radians
+    range_min: Metres
+    range_max: MaxRange
+    mount: Annotated[Pose2D, IN_MESSAGE]
     ranges: NDArray[np.float32]
 
     def returns(self) -> NDArray[np.bool_]:
@@ -157,6 +192,17 @@ class LaserScan(Observation):
         return out
 
 
+def _named(class_id: object) -> object:
+    """Some detectors number their classes."""
+    return str(class_id) if type(class_id) is int else class_id
+
+
+def _has_sides(box: Box3D) -> Box3D:
+    if box.xmin > box.xmax or box.ymin > box.ymax or box.zmin > box.zmax:
+        raise ValueError("a side begins behind its end")
+    return box
+
+
 @dataclass(frozen=True, slots=True)
 class Detection:
     """One box that a robot's detector reported.
@@ -168,11 +214,11 @@ class Detection:
         frame_id: As sent (``iveg.domain.frames`` resolves it); None: without one.
     """
 
-    class_id: str
-    probability: float
-    box: Box3D
-    frame_id: str | None = None
-    det_id: str | None = None
+    class_id: Annotated[Text, BeforeValidator(_named)]
+    probability: Share
+    box: Annotated[Box3D, AfterValidator(_has_sides), Field(alias="position")]
+    frame_id: FrameName | None = None
+    det_id: Text | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,14 +233,14 @@ class DetectionFrame(Observation):
 
     detections: tuple[Detection, ...]
     unread: tuple[str | None, ...] = ()
-    detector: str | None = None
+    detector: Text | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Hold:
     """A reason why a robot may not move (docs/safety.md, "Holds")."""
 
-    id: str
+    id: Text
     source: Literal["iveg", "boot", "hw", "bumper", "link"]
     ack: Literal["remote", "local", "auto"]
 
@@ -209,9 +255,9 @@ class RobotFault:
         for_s: For how long (s); None where that is not known.
     """
 
-    code: str
-    about: str = ""
-    for_s: float | None = None
+    code: Text
+    about: Text = ""
+    for_s: Seconds | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,10 +283,32 @@ class ReportedObstacle:
         moved: It walks, or has walked since the laser saw it first.
     """
 
-    x: float
-    y: float
-    width_m: float
-    moved: bool = False
+    x: Annotated[Metres, digits(2)]
+    y: Annotated[Metres, digits(2)]
+    width_m: Annotated[float, Strict(), Field(ge=0, le=100), digits(2)]
+    moved: Flag
+
+
+def _is_true(value: object) -> bool:
+    """A wish that cannot be read is none."""
+    return value is True
+
+
+Reason = Annotated[
+    Text,
+    one_of(
+        "clear",
+        "person",
+        "robot",
+        "stale",
+        "doubt",
+        "unsupervised",
+        "hold",
+        "watchdog",
+        "obstacle",
+    ),
+]
+Holds = Annotated[tuple[Hold, ...], Field(max_length=MAX_TEXT)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,37 +326,46 @@ class SafetyReport(Observation):
         obstacle: What its laser sees near it, whatever it is slow for.
     """
 
-    speed_factor: float
-    reason: str
-    cause: str | None = None
-    decision_id: str | None = None
-    holds: tuple[Hold, ...] = ()
-    released: tuple[str, ...] = ()
-    challenge: str | None = None
-    linear: float = 0.0
-    angular: float = 0.0
-    feedback_age_s: float | None = None
-    faults: tuple[RobotFault, ...] = ()
-    peer_scans: bool = False
-    obstacle: ReportedObstacle | None = None
+    speed_factor: Annotated[float, Strict(), Field(ge=0, le=1)]
+    reason: Reason
+    cause: Text | None = None
+    decision_id: Text | None = None
+    holds: Holds = ()
+    released: Annotated[tuple[Text, ...], Field(max_length=MAX_TEXT)] = ()
+    challenge: Annotated[Text | None, Field(alias="ch")] = None
+    linear: Annotated[Speed, Field(alias="v")] = 0.0
+    angular: Annotated[Speed, Field(alias="w")] = 0.0
+    feedback_age_s: Seconds | None = None
+    faults: Annotated[tuple[RobotFault, ...], Field(max_length=MAX_TEXT), IF_ANY] = ()
+    peer_scans: Annotated[bool, BeforeValidator(_is_true), IF_ANY] = False
+    obstacle: Annotated[ReportedObstacle | None, OR_NONE, IF_ANY] = None
+
+
+def _level(point: object) -> object:
+    """A point of a path may have a height, which is left."""
+    return point[:2] if isinstance(point, list) and len(point) == 3 else point
+
+
+Millimetres = Annotated[Metres, digits(3)]
+Waypoint = Annotated[tuple[Millimetres, Millimetres], BeforeValidator(_level)]
 
 
 @dataclass(frozen=True, slots=True)
 class Navigation(Observation):
     """A robot's intent: task, goal and path in ``map`` (m)."""
 
-    task: str
-    goal: tuple[float, float] | None = None
-    path: tuple[tuple[float, float], ...] = ()
+    task: Text
+    goal: Annotated[tuple[Metres, Metres], *place("xy", 3)] | None = None
+    path: Annotated[tuple[Waypoint, ...], Field(max_length=MAX_PATH)] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Battery(Observation):
     """The battery, as the robot said last."""
 
-    percentage: float | None = quantity("0–1", "charge", 0, 1)
-    charging: bool | None = quantity("–", "whether it charges")
-    voltage: float | None = quantity("V", "voltage", 0, 1e4)
+    percentage: Annotated[float | None, Quantity("0–1", "charge", 0, 1)] = None
+    charging: Annotated[bool | None, Quantity("–", "whether it charges")] = None
+    voltage: Annotated[float | None, Quantity("V", "voltage", 0, 1e4)] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -307,13 +384,17 @@ class CommandAnswer(Observation):
         attempt: Of the release or resume that is answered; None for a STOP.
     """
 
-    id: str | None
-    result: str
-    holds: tuple[Hold, ...] = ()
-    challenge: str | None = None
-    linear: float = 0.0
-    why: str | None = None
-    attempt: str | None = None
+    id: Annotated[Text | None, Field(default=None)]
+    result: Annotated[
+        Text,
+        one_of("LATCHED", "RELEASED", "RESUMED", "REFUSED"),
+        Field(alias="r"),
+    ]
+    holds: Holds = ()
+    challenge: Annotated[Text | None, Field(alias="ch")] = None
+    linear: Annotated[Speed, Field(alias="v")] = 0.0
+    why: Text | None = None
+    attempt: Text | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -326,9 +407,13 @@ class GoalAnswer(Observation):
         why: Code of the reason of a refusal, or for which it was dropped.
     """
 
-    id: str
-    result: str
-    why: str | None = None
+    id: Text
+    result: Annotated[
+        Text,
+        one_of("ACCEPTED", "REFUSED", "REACHED", "DROPPED"),
+        Field(alias="r"),
+    ]
+    why: Text | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -337,9 +422,11 @@ class Climate(Observation):
 
     robot_id: str = field(default="", init=False)
     origin: Origin = field(default=UNKNOWN_ORIGIN, init=False)
-    temperature: float | None = None
-    relative_humidity: float | None = None
-    co2: float | None = None
+    temperature: Annotated[float | None, Strict(), Field(ge=-60, le=90)] = None
+    relative_humidity: Annotated[
+        float | None, Strict(), Field(ge=0, le=1, alias="relativeHumidity")
+    ] = None
+    co2: Annotated[float | None, Strict(), Field(ge=0, le=100_000)] = None
 
 
 @dataclass(frozen=True, slots=True)

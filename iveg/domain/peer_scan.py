@@ -6,13 +6,15 @@ the laser did not see to be free; where any ray in it says nothing, it says noth
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, ConfigDict, Field, Strict
 
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import LaserScan, Origin
+from iveg.domain.wire import MaxRange, Text, digits
 
 BEAMS: Final = 72
 PLACES: Final = 10
@@ -27,6 +29,14 @@ _ROUNDED = 0.05
 SAYS_NOTHING = np.float32(0.0)
 
 _Floats = NDArray[np.float32]
+_LONGEST_ROBOT_M = 5.0
+"""No robot is longer than twice this."""
+
+
+def _on_a_robot(mount: Pose2D) -> Pose2D:
+    if max(abs(mount.x), abs(mount.y)) > _LONGEST_ROBOT_M:
+        raise ValueError("a laser beyond any robot")
+    return mount
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,12 +53,14 @@ class PeerScan:
         places: Shape (72,): where across the beam its range was measured.
     """
 
-    robot_id: str
+    __pydantic_config__ = ConfigDict(arbitrary_types_allowed=True)
+
+    robot_id: Text
     origin: Origin
-    pose: Pose2D
-    age_s: float
-    mount: Pose2D
-    range_max: float
+    pose: Annotated[Pose2D, Field(alias="robot_pose")]
+    age_s: Annotated[float, Strict(), Field(ge=0, le=OLDEST_S), digits(3)]
+    mount: Annotated[Pose2D, AfterValidator(_on_a_robot)]
+    range_max: Annotated[MaxRange, digits(3)]
     ranges: _Floats
     places: NDArray[np.uint8]
 

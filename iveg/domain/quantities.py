@@ -1,12 +1,16 @@
-"""The quantities of a small sensor: declared once, at the member of its value."""
+"""The quantities of a message: declared once, at the member that holds the value."""
 
-from dataclasses import dataclass, field, fields
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, get_type_hints
+
+from annotated_types import Ge, GroupedMetadata, Le
+from pydantic import Strict
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
-    """What one member of a small sensor's value is, on every way it takes.
+class Quantity(GroupedMetadata):
+    """What one member of a message is, on every way it takes; None: not known.
 
     Attributes:
         unit: SI, or such as ``0–1``; ``–``: none.
@@ -19,33 +23,36 @@ class Quantity:
     least: float | None = None
     most: float | None = None
 
-
-def quantity(
-    unit: str, meaning: str, least: float | None = None, most: float | None = None
-) -> Any:
-    """A member of a small sensor's observation; None where it is not known."""
-    return field(
-        default=None, metadata={"quantity": Quantity(unit, meaning, least, most)}
-    )
+    def __iter__(self) -> Iterator[object]:
+        """What a value is checked by when it is read."""
+        yield Strict()
+        if self.least is not None:
+            yield Ge(self.least)
+        if self.most is not None:
+            yield Le(self.most)
 
 
 _QUANTITIES: dict[type, dict[str, Quantity]] = {}
 
 
 def quantities_of(of: type) -> dict[str, Quantity]:
-    """The members of a small sensor's value, by name.
+    """The quantities of a message, by name.
 
-    Asked for each robot in each frame of a page, so it is looked up once.
+    Asked for each robot in each frame of a page, so they are looked up once.
     """
     if of not in _QUANTITIES:
-        found = {one.name: one.metadata.get("quantity") for one in fields(of)}
-        _QUANTITIES[of] = {n: one for n, one in found.items() if one is not None}
+        _QUANTITIES[of] = {
+            name: part
+            for name, hint in get_type_hints(of, include_extras=True).items()
+            for part in getattr(hint, "__metadata__", ())
+            if isinstance(part, Quantity)
+        }
     return _QUANTITIES[of]
 
 
 def flags_of(of: type) -> list[str]:
     """The quantities of a small sensor that are true or false, by name."""
-    types = {one.name: one.type for one in fields(of)}
+    types = get_type_hints(of)
     return [name for name in quantities_of(of) if types[name] == bool | None]
 
 

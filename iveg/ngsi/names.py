@@ -80,9 +80,13 @@ class RobotDevice:
 
 ROBOT_DEVICES = (
     RobotDevice(
-        "", (*ALGORITHM_1.items(), *(a for one in MEASURED for a in one.attributes))
+        "",
+        (
+            *ALGORITHM_1.items(),
+            *(pair for kind in MEASURED for pair in kind.attributes),
+        ),
     ),
-    *(RobotDevice(one.suffix or "", one.attributes, one.of) for one in MEASURED),
+    *(RobotDevice(kind.suffix or "", kind.attributes, kind.of) for kind in MEASURED),
 )
 """The command device sorts before its sensors, and is provisioned last where the agent
 keeps its registry in memory, so that either registry picks it (docs/fiware.md)."""

@@ -16,8 +16,8 @@ from iveg.domain.feedback import (
 from iveg.domain.geometry import REST, Pose2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import FeedbackRef
+from iveg.domain.wire import FORBIDDEN
 from iveg.domain.witness import KnownPeer
-from iveg.ngsi.payloads import FORBIDDEN
 from iveg.robot.gate import FREE, Ahead, Cap, known_reason, quantised
 from iveg.robot.peer_alerts import (
     KeptAlert,

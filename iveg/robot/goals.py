@@ -15,11 +15,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError
 
+from iveg.domain import wire
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D
 from iveg.domain.goals import CancelOrder, Goal, GoalKind, GoalOrder
 from iveg.domain.observations import GoalAnswer, Origin
-from iveg.ngsi import names, payloads
+from iveg.ngsi import names
 from iveg.ngsi.codec import load_json
 
 Navigate = Callable[[Goal | None], bool]
@@ -141,19 +142,19 @@ class RobotGoals:
 # Messages about goals, as robots receive them.
 
 
-class _Named(payloads.Wire, extra="forbid"):
-    id: Annotated[payloads.Text, Field(min_length=1)]
+class _Named(wire.Wire, extra="forbid"):
+    id: Annotated[wire.Text, Field(min_length=1)]
 
 
 class _Set(_Named):
     kind: GoalKind
-    x: payloads.Metres
-    y: payloads.Metres
+    x: wire.Metres
+    y: wire.Metres
     ch: Annotated[str, Field(min_length=1)]
     until: float
 
 
-class _Value(payloads.Wire, extra="forbid"):
+class _Value(wire.Wire, extra="forbid"):
     set: _Set | None = None
     cancel: _Named | None = None
 

@@ -5,13 +5,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import orjson
-from pydantic import Field, ValidationError
+from pydantic import BaseModel, ValidationError
 
 from iveg.adapters.files import write_bytes
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import Hold
-from iveg.ngsi.codec import fields, load_json
-from iveg.ngsi.payloads import HoldValue, Wire
+from iveg.ngsi.codec import load_json
 
 # --- holds ------------------------------------------------------------------------
 #
@@ -105,12 +104,12 @@ class HoldSet:
 # the old set or the new one.  An unreadable file is not treated as an empty set.
 
 
-class _StoredHolds(Wire):
+class _StoredHolds(BaseModel):
     """The file; those of older versions lack ``joined``."""
 
-    holds: list[HoldValue]
-    released: list[str]
-    joined: list[str] = Field(default_factory=list)
+    holds: tuple[Hold, ...]
+    released: tuple[str, ...]
+    joined: tuple[str, ...] = ()
 
 
 def read_holds(file: Path) -> HoldSet | None:
@@ -121,8 +120,7 @@ def read_holds(file: Path) -> HoldSet | None:
         return HoldSet()
     except (OSError, UnreadableError, ValidationError):
         return None
-    holds = fields.read_holds(stored.holds)
-    return HoldSet(holds, tuple(stored.released), tuple(stored.joined))
+    return HoldSet(stored.holds, stored.released, stored.joined)
 
 
 def write_holds(file: Path, holds: HoldSet) -> None:

@@ -5,10 +5,11 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, ValidationError
 
+from iveg.domain import wire
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import CommandAnswer, SafetyReport
-from iveg.ngsi import names, payloads
+from iveg.ngsi import names
 from iveg.ngsi.codec import load_json
 from iveg.robot.holds import HoldSet
 
@@ -40,7 +41,7 @@ def _refuse_unusable(text: str) -> str:
 _Name = Annotated[str, Field(min_length=1)]
 
 
-class ResumeOrder(payloads.Wire, extra="forbid"):
+class ResumeOrder(wire.Wire, extra="forbid"):
     """Drive again after a release.
 
     Attributes:
@@ -128,9 +129,9 @@ def _member(value: object, name: str) -> object:
 
 
 def _usable_id(value: object) -> str | None:
-    if not isinstance(value, str) or not value or payloads.FORBIDDEN & set(value):
+    if not isinstance(value, str) or not value or wire.FORBIDDEN & set(value):
         return None
-    return value if payloads.clean_text(value) == value else None
+    return value if wire.clean_text(value) == value else None
 
 
 def _release_or_resume(message: object) -> Order:

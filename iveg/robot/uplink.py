@@ -6,13 +6,13 @@ from collections import Counter, deque
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
-from typing import Any, Literal
+from typing import Literal
 
 import orjson
 
 from iveg.domain.errors import HopError
 from iveg.domain.geometry import Pose2D
-from iveg.domain.kinds import KIND_OF, MEASURED, SENSED
+from iveg.domain.kinds import KIND_OF, MEASURED
 from iveg.domain.observations import (
     CommandAnswer,
     Detection,
@@ -21,7 +21,6 @@ from iveg.domain.observations import (
     GoalAnswer,
     Instant,
     LaserScan,
-    Navigation,
     Observation,
     Odometry,
     Origin,
@@ -29,8 +28,8 @@ from iveg.domain.observations import (
     Unplaced,
 )
 from iveg.ngsi import codec, names
-from iveg.ngsi.codec.fields import write_lidar_header, write_motion, write_origin
-from iveg.ngsi.codec.reports import write_unread
+from iveg.ngsi.codec.fields import write_message, write_origin
+from iveg.ngsi.codec.outgoing import write_scan, write_unread
 from iveg.robot.holds import HoldSet
 
 # --- rates ------------------------------------------------------------------------
@@ -167,7 +166,7 @@ class SinglePayload:
         """Payload of ``/{apikey}/{robot}/attrs`` for this odometry tick."""
         origin = write_origin(odometry.origin)
         payload: dict[str, object] = {
-            "pose": {**write_motion(odometry.pose, odometry.twist), **origin},
+            "pose": write_message(odometry) | origin,
             "timestamp": odometry.origin.stamp,
             "TimeInstant": odometry.origin.stamp,
         }
@@ -180,8 +179,8 @@ class SinglePayload:
             self._saw_nothing = False
             payload |= {names.BOXES: [], names.BOXES_HEADER: origin}
         if self.scan is not None:
-            payload["laser_scan"] = self.scan.ranges
-            payload[names.LIDAR_HEADER] = write_lidar_header(self.scan, origin)
+            scan = replace(self.scan, origin=odometry.origin)
+            payload |= write_scan(scan, "laser_scan")
             self.scan = None
         return orjson.dumps(payload, option=orjson.OPT_SERIALIZE_NUMPY)
 
@@ -324,14 +323,6 @@ _IN_ONE = Odometry, LaserScan, DetectionFrame
 """Kinds in the single payload of Algorithm 1."""
 Form = Literal["per-topic", "single"]
 
-_WRITERS: dict[type, Callable[[Any], bytes]] = {
-    Odometry: codec.write_odometry,
-    LaserScan: codec.write_scan,
-    DetectionFrame: codec.write_detections,
-    Navigation: codec.write_navigation,
-    Unplaced: codec.write_unplaced,
-    **{one.of: codec.write_sensed for one in SENSED},
-}
 _UNPLACED = {"odometry": Odometry, "scan": LaserScan}
 _SAFETY = KIND_OF[SafetyReport].suffix or ""
 _ANSWERS, _GOALS = "cmdexe", "goal"
@@ -419,7 +410,7 @@ class Uplink:
         suffix = _suffix_of(observation)
         origin = self._origins.next(suffix, at)
         stamped = replace(observation, robot_id=self._id, origin=origin)
-        payload = _WRITERS[type(observation)](stamped)
+        payload = codec.write_measure(stamped)
         self._emit(suffix, payload, at.mono, news=news)
 
     def _is_news(self, frame: DetectionFrame) -> bool:
@@ -435,7 +426,7 @@ class Uplink:
         Both have the same bytes: the first to arrive counts.
         """
         origin = self._origins.next(_SAFETY, at)
-        payload = codec.write_safety(replace(report, origin=origin))
+        payload = codec.write_measure(replace(report, origin=origin))
         messages = [LaneMessage(names.direct_topic(self._id, _SAFETY), payload)]
         if is_measure:
             messages.append(LaneMessage(self._topic(_SAFETY), payload))
@@ -451,7 +442,7 @@ class Uplink:
         """The message of a word on a goal on ``cmdexe``."""
         origin = self._origins.next(_GOALS, at)
         topic = names.answer_topic(self._apikey, self._id)
-        payload = codec.write_goal_answer(replace(answer, origin=origin))
+        payload = codec.write_answer(replace(answer, origin=origin))
         return LaneMessage(topic, payload)
 
     def _send_single(

@@ -1,1 +1,1 @@
-"""What a limit or a STOP needs: observations in; feedback, orders and alerts out."""
+"""Parts of a limit or a STOP: observations in; feedback, orders and alerts out."""

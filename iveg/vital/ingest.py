@@ -24,6 +24,7 @@ from iveg.domain.observations import (
     RefusedFrame,
     kind_of,
 )
+from iveg.domain.world import World
 from iveg.vital.waiting import wait_set
 
 _log = logging.getLogger(__name__)
@@ -41,30 +42,19 @@ class Ingest:
     """Holds what has arrived until the rule loop takes it.
 
     Args:
-        known: Whether a robot id belongs to the fleet.
-        rejected: Called once for each new kind of rejection, with source and reason.
-        is_past: Whether a message is too old to be read.
+        world: The fleet; knows who is heard, and what a stream is past.
         passed: Called with each copy of a message of the fleet, before it is queued.
-        is_refused_robot: Whether a setting says that a robot is not heard.
-        misplaced: Name of the frame that odometry is in, if that is not its robot's.
+        rejected: Called once for each new kind of rejection, with source and reason.
     """
 
     def __init__(
         self,
-        known: Callable[[str], bool],
-        rejected: Callable[[str, str], None] = lambda _source, _reason: None,
-        is_past: Callable[[str, type[Observation], str, int], bool] = lambda *_: False,
-        passed: Callable[[Received], None] = lambda _: None,
-        is_refused_robot: Callable[[str], bool] = lambda _: False,
-        misplaced: Callable[[Observation], str | None] = lambda _: None,
+        world: World,
+        passed: Callable[[Received], None],
+        rejected: Callable[[str, str], None],
     ) -> None:
-        self._is_refused_robot = is_refused_robot
-        self._misplaced = misplaced
-        self._known = known
-        self._passed = passed
-        self._is_past = is_past
-        self._rejected = rejected
-        self._queue: deque[tuple[Received, _Stream]] = deque()
+        self._world, self._passed, self._rejected = world, passed, rejected
+        self._queue: deque[Received] = deque()
         self._refused: dict[str, Received] = {}
         """By robot, that one of its detection frames was dropped."""
         self._identities: set[_Identity] = set()
@@ -83,13 +73,13 @@ class Ingest:
     def enqueue(self, received: Received) -> None:
         """Queue one observation; never blocks."""
         robot_id = received.observation.robot_id
-        if robot_id and not self._known(robot_id):
+        if robot_id and robot_id not in self._world.robots:
             self.reject(robot_id, "unknown_robot", str(UnknownRobotError(robot_id)))
             return
-        if self._is_refused_robot(robot_id):
+        if self._world.is_refused(robot_id):
             self.reject(robot_id, "refused_robot", "is not heard, by a setting")
             return
-        if (frame := self._misplaced(received.observation)) is not None:
+        if (frame := self._world.misplaced(received.observation)) is not None:
             self.reject(robot_id, "unknown_frame", f"odometry: {frame}")
             return
         name = kind_of(received.observation).__name__
@@ -108,7 +98,7 @@ class Ingest:
         stream = _stream(received)
         if len(self._queue) >= MAX_QUEUED and not self._make_room(received, stream):
             return
-        self._queue.append((received, stream))
+        self._queue.append(received)
         if not received.asked:
             self._identities.add(_identity(received.observation))
         self._waiting[stream] += 1
@@ -159,7 +149,7 @@ class Ingest:
         return (
             (robot_id, kind, boot, seq) in self._identities
             or now < self._due.get((robot_id, kind), 0.0)
-            or self._is_past(robot_id, kind, boot, seq)
+            or self._world.is_past(robot_id, kind, boot, seq)
         )
 
     def is_early(self, robot_id: str, kind: type[Observation], now: float) -> bool:
@@ -183,7 +173,7 @@ class Ingest:
     def _may_log(self, source: str) -> bool:
         """Whether there is room: whoever uses up the own leaves that of others."""
         robot_id = source.partition("_")[0]
-        owner = robot_id if self._known(robot_id) else None
+        owner = robot_id if robot_id in self._world.robots else None
         self._logged[owner] += 1
         return self._logged[owner] <= _MOST_LOGGED
 
@@ -195,8 +185,8 @@ class Ingest:
     def drain(self) -> Iterable[Received]:
         """Everything that waits, oldest first."""
         while self._queue:
-            received, stream = self._queue.popleft()
-            self._forget(received, stream)
+            received = self._queue.popleft()
+            self._forget(received)
             yield received
         refused, self._refused = self._refused, {}
         yield from refused.values()
@@ -213,15 +203,15 @@ class Ingest:
         """
         victim = self._victim_for(stream)
         if victim is None:
-            self._note_dropped(received, stream)
+            self._note_dropped(received)
             return False
         index = next(
-            number for number, (_, one) in enumerate(self._queue) if one == victim
+            index for index, one in enumerate(self._queue) if _stream(one) == victim
         )
-        dropped, _ = self._queue[index]
+        dropped = self._queue[index]
         del self._queue[index]
-        self._forget(dropped, victim)
-        self._note_dropped(dropped, victim)
+        self._forget(dropped)
+        self._note_dropped(dropped)
         return True
 
     def _victim_for(self, stream: "_Stream") -> "_Stream | None":
@@ -235,15 +225,16 @@ class Ingest:
             return telemetry
         return stream if count(stream) else largest
 
-    def _note_dropped(self, received: Received, stream: "_Stream") -> None:
-        robot_id, kind = stream
+    def _note_dropped(self, received: Received) -> None:
+        robot_id, kind = _stream(received)
         self.counters[f"dropped.{kind.__name__}"] += 1
         if kind is DetectionFrame:
             self._refused[robot_id] = replace(
                 received, observation=RefusedFrame(robot_id)
             )
 
-    def _forget(self, received: Received, stream: "_Stream") -> None:
+    def _forget(self, received: Received) -> None:
+        stream = _stream(received)
         self._identities.discard(_identity(received.observation))
         self._waiting[stream] -= 1
         if not self._waiting[stream]:

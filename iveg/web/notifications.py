@@ -6,8 +6,9 @@ its own limit and secret.  Refusals look like those of the rest of the applicati
 
 import asyncio
 from collections.abc import Callable, Container, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import Final
+from typing import Final, Protocol
 
 from starlette.responses import Response
 from starlette.routing import Route
@@ -16,7 +17,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import EntityReading, Instant, Observation, Received
 from iveg.domain.transports import FIWARE
-from iveg.ngsi.codec import UNREAD, read_notification
+from iveg.ngsi.codec import read_notification
 from iveg.vital.ingest import Ingest
 from iveg.vital.ports import Clock
 from iveg.web.problems import Problem, problem_of
@@ -24,12 +25,38 @@ from iveg.web.security.headers import MAX_BODY, NOTIFICATIONS_PATH, TOO_LONG
 from iveg.web.security.roles import Action
 from iveg.web.security.secrets import NotifySecret
 
-Recorded = Callable[[bytes, Instant, Sequence[Observation]], None]
 A_TURN: Final = 4
 """Read in one turn of the loop, which reads one message of each MQTT connection: what
 comes straight from a robot must not wait behind copies."""
 _TAKEN = Response(status_code=204)
 _FORGED = Problem(401, "The notification secret is wrong.")
+
+
+class Subscriptions(Protocol):
+    """Subscriptions that iVeg made at Orion."""
+
+    def is_ours(self, subscription_id: str) -> bool:
+        """Whether a subscription is one that iVeg made."""
+
+    def is_former(self, secret: str) -> bool:
+        """Whether a secret may be that of our own earlier start."""
+
+
+@dataclass(frozen=True, slots=True)
+class Followers:
+    """Listeners to notifications; none of them may wait or fail.
+
+    Attributes:
+        notified: Each notification of Orion's came then.
+        equipment: Id and type of the entities that ``measured`` is told of.
+        measured: A reading of other equipment.
+        recorded: Each body that is read, and what is observed in it.
+    """
+
+    notified: Callable[[Instant], None]
+    equipment: Container[tuple[str, str]]
+    measured: Callable[[EntityReading, Instant], None]
+    recorded: Callable[[bytes, Instant, Sequence[Observation]], None]
 
 
 class NotificationEndpoint:
@@ -39,13 +66,9 @@ class NotificationEndpoint:
         ingest: Where observations go and what cannot be used is counted.
         secret: What a notification must carry.
         clock: Read once a notification.
-        is_ours: Whether a subscription id is one that iVeg made.
+        subscriptions: Those that iVeg made.
         tenant: The Fiware service and path that count.
-        heard: Told of each notification of Orion's.
-        equipment: Id and type of the entities that ``measured`` is told of.
-        measured: Told of other equipment; must neither wait nor fail.
-        recorded: Told of each body that is read and what is observed in it; likewise.
-        is_former: Whether a secret may be that of our own earlier start.
+        followers: What else is told.
     """
 
     action: Final[Action] = "open"
@@ -56,24 +79,13 @@ class NotificationEndpoint:
         ingest: Ingest,
         secret: NotifySecret,
         clock: Clock,
-        is_ours: Callable[[str], bool],
+        subscriptions: Subscriptions,
         tenant: tuple[str, str],
-        heard: Callable[[Instant], None],
-        equipment: Container[tuple[str, str]] = frozenset(),
-        measured: Callable[[EntityReading, Instant], None] = lambda *_: None,
-        recorded: Recorded = lambda *_: None,
-        is_former: Callable[[str], bool] = lambda _: False,
+        followers: Followers,
     ) -> None:
-        self._ingest = ingest
-        self._secret = secret
-        self._clock = clock
-        self._is_ours = is_ours
-        self._tenant = tenant
-        self._heard = heard
-        self._equipment = equipment
-        self._measured = measured
-        self._recorded = recorded
-        self._is_former = is_former
+        self._ingest, self._secret, self._clock = ingest, secret, clock
+        self._subscriptions, self._tenant = subscriptions, tenant
+        self._followers = followers
         self._turn = asyncio.Semaphore(A_TURN)
 
     def route(self) -> Route:
@@ -109,7 +121,7 @@ class NotificationEndpoint:
         given = headers.get(b"x-iveg-notify-token", b"").decode("latin-1")
         if self._secret.admits(given):
             return None
-        if given and self._is_former(given):
+        if given and self._subscriptions.is_former(given):
             # Our own subscriptions until they are mended: no reason to suspect anybody.
             self._ingest.counters["rejected.former_secret"] += 1
             return _FORGED
@@ -126,25 +138,24 @@ class NotificationEndpoint:
 
     def receive(self, body: bytes) -> Problem | None:
         """Take a body that has just come; what is wrong with it, or None."""
-        at = self._clock()
+        at, followers = self._clock(), self._followers
         try:
             subscription_id, reading = read_notification(
                 body,
                 partial(self._ingest.is_past, now=at.mono),
-                UNREAD,
-                self._equipment,
+                followers.equipment,
             )
         except UnreadableError as error:
             return problem_of(error)
-        if not self._is_ours(subscription_id):
+        if not self._subscriptions.is_ours(subscription_id):
             self._ingest.reject(subscription_id, "unknown_subscription")
             return None
-        self._heard(at)
-        self._recorded(body, at, reading.observations)
+        followers.notified(at)
+        followers.recorded(body, at, reading.observations)
         for problem in reading.problems:
             self._ingest.reject(problem.source, problem.reason, problem.detail)
         for entity in reading.equipment:
-            self._measured(entity, at)
+            followers.measured(entity, at)
         for observation in reading.observations:
             self._ingest.enqueue_copy(Received(observation, at, FIWARE.id))
         return None

@@ -43,8 +43,8 @@ from iveg.domain.errors import (
     UnreadableError,
     VersionMissingError,
 )
+from iveg.domain.wire import all_legible
 from iveg.models.base import stamp
-from iveg.ngsi.payloads import all_legible
 
 
 class NotSignedInError(IvegError):

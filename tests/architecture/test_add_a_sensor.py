@@ -1,4 +1,4 @@
-"""A sensor of two words is added to a copy of the program, as CONTRIBUTING says."""
+"""A sensor, and a quantity of odometry, are added to a copy of the program."""
 
 import os
 import shutil
@@ -23,7 +23,7 @@ STEPS: Mapping[str, tuple[tuple[str, str], ...]] = {
 class SoilMoisture(Observation):
     \"\"\"Water in the soil at the robot's probe.\"\"\"
 
-    percentage: float | None = quantity("%", "share of the volume", 0, 100)
+    percentage: Annotated[float | None, Quantity("%", "of the volume", 0, 100)] = None
 
 
 """,
@@ -99,11 +99,31 @@ def write_moisture(_: ros.Header, moisture: Any) -> Float32:
         for language, name in (("en", "Soil moisture"), ("es", "Humedad del suelo"))
     },
 }
+QUANTITY = (
+    '    slip: Annotated[float | None, Quantity("0–1", "lost turn", 0, 1)] = None\n'
+)
+AFTER = "    frame_id: Annotated[FrameName | None, IF_ANY] = None\n"
+SLIPS = """
+from dataclasses import replace
+from iveg.domain.observations import Odometry, Instant
+from iveg.ngsi import codec
+from iveg.robot.uplink import Origins, Uplink
+from tests.builders import odometry
+
+sent = {}
+uplink = Uplink("AGI", "iveg", Origins("boot"), sent.__setitem__)
+uplink.send(replace(odometry(), slip=0.25), Instant(1.0, 1.7e9))
+(read,) = codec.read_measure("AGI_odom", sent["/iveg/AGI_odom/attrs"]).observations
+assert isinstance(read, Odometry) and read.slip == 0.25, read
+wrong = sent["/iveg/AGI_odom/attrs"].replace(b"0.25", b"1.25")
+(problem,) = codec.read_measure("AGI_odom", wrong).problems
+assert problem.reason == "bad_base_pose_ground_truth", problem
+"""
 GUARDS = ("tests/architecture/test_sensors.py", "tests/unit/test_page_types.py")
 WRITERS = "iveg.models.typescript", "tests.architecture.sensor_pages"
 WHOLE = """
 from dataclasses import replace
-from iveg.adapters.subscriptions import WANTED_OF_ALL
+from iveg.adapters.reconciler import WANTED_OF_ALL
 from iveg.domain.observations import Instant, Received, SoilMoisture
 from iveg.domain.records import ReadingRecord
 from iveg.domain.world import World
@@ -193,6 +213,16 @@ def test_a_sensor_takes_six_files_and_seventy_lines() -> None:
 
     assert len(STEPS) <= 6
     assert sum(text.count("\n") for text in added) <= 70
+
+
+def test_a_quantity_of_odometry_takes_one_line(copy: Path) -> None:
+    declared = copy / "iveg/domain/observations.py"
+    text = declared.read_text()
+    assert text.count(AFTER) == 1
+    declared.write_text(text.replace(AFTER, AFTER + QUANTITY))
+
+    assert QUANTITY.count("\n") == 1
+    assert python(copy, "-c", SLIPS) == (0, "")
 
 
 def test_a_sensor_of_two_words_reaches_everything(copy: Path) -> None:

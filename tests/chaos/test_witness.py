@@ -18,18 +18,18 @@ def later() -> float:
 def tell(witness: Witness, *speeds: float) -> None:
     for speed in speeds:
         moving = odometry("AGI", linear=speed, origin=origin(after=later()))
-        witness.take("/iveg/AGI_odom/attrs", codec.write_odometry(moving))
+        witness.take("/iveg/AGI_odom/attrs", codec.write_measure(moving))
 
 
 def hold(witness: Witness, seq: int = 1, after: float | None = None) -> None:
     held = Hold("01A", "iveg", "remote")
     report = safety_report("AGI", held, origin=origin(seq, after=after or later()))
-    witness.take("/iveg/AGI_safety/attrs", codec.write_safety(report))
+    witness.take("/iveg/AGI_safety/attrs", codec.write_measure(report))
 
 
 def free(witness: Witness, seq: int) -> None:
     report = safety_report("AGI", origin=origin(seq))
-    witness.take("/AGI/iveg/safety", codec.write_safety(report))
+    witness.take("/AGI/iveg/safety", codec.write_measure(report))
 
 
 def test_a_motion_that_nobody_allowed_is_counted_once() -> None:
@@ -57,8 +57,8 @@ def test_a_resume_allows_motions_until_the_robot_is_held_again() -> None:
 def test_what_goes_past_the_agent_is_seen_too() -> None:
     witness = Witness(0)
     report = safety_report("AGI", Hold("01A", "iveg", "remote"))
-    witness.take("/AGI/iveg/safety", codec.write_safety(report))
-    witness.take("/AGI/iveg/odom", codec.write_odometry(odometry("AGI", linear=0.3)))
+    witness.take("/AGI/iveg/safety", codec.write_measure(report))
+    witness.take("/AGI/iveg/odom", codec.write_measure(odometry("AGI", linear=0.3)))
 
     assert witness.of("AGI").held
     assert witness.unlicensed == 1

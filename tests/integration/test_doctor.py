@@ -10,7 +10,7 @@ import pytest
 from iveg.adapters import clock
 from iveg.adapters.history.engine import upgrade
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.subscriptions import ensure_subscriptions, wanted_for
+from iveg.adapters.reconciler import ensure_subscriptions, wanted_for
 from iveg.cli.doctor import Finding, Findings, examine
 from iveg.domain.probe import Hop
 from iveg.lab.embedded.server import Running

@@ -20,7 +20,7 @@ import httpx
 import pytest
 
 from iveg.adapters.mqtt import BrokerAddress
-from iveg.adapters.subscriptions import wanted_for
+from iveg.adapters.reconciler import wanted_for
 from tests.bonds import bound
 from tests.brokers import MOSQUITTO, PLAIN
 from tests.faulty_fiware import MODULE

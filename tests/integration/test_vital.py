@@ -48,12 +48,12 @@ class Field:
             for x, robot_id in enumerate(ROBOTS):
                 at = Origin(f"boot-{robot_id}", self.seq)
                 pose = odometry(robot_id, 10.0 + 30.0 * x, 10.0, origin=at)
-                self.say(robot_id, "_odom", codec.write_odometry(pose))
+                self.say(robot_id, "_odom", codec.write_measure(pose))
             at = Origin("boot-AGI", self.seq)
             flat = scan("AGI", [3.0] * 90, angle_increment=0.0, origin=at)
-            self.say("AGI", "_lidar2D", codec.write_scan(flat))
+            self.say("AGI", "_lidar2D", codec.write_measure(flat))
             good = scan("AGII", [3.0] * 90, angle_increment=math.tau / 90)
-            self.say("AGII", "_lidar2D", codec.write_scan(good))
+            self.say("AGII", "_lidar2D", codec.write_measure(good))
             await asyncio.sleep(0.05)
 
     async def live(self) -> None:

@@ -80,10 +80,7 @@ class Field:
             "iveg",
             FLEET,
             desk.clock,
-            desk.ingest.enqueue,
-            desk.ingest.reject,
-            is_past=desk.ingest.is_past,
-            is_early=desk.ingest.is_early,
+            desk.ingest,
         )
         self.stage = Stage(
             self.world,

@@ -15,9 +15,11 @@ from hypothesis import strategies as st
 
 from iveg.adapters.direct import DirectReader
 from iveg.domain.observations import Navigation, Received
+from iveg.domain.world import World
 from iveg.models.base import write_json
 from iveg.ngsi import codec
-from tests.builders import at, notification, origin, pose_value
+from iveg.vital.ingest import Ingest
+from tests.builders import at, ignore, notification, origin, pose_value
 from tests.unit.web.desk import WebDesk
 from tests.unit.web.live.test_socket import looking
 from tests.unit.web.whole import WholeServer, whole_server
@@ -144,20 +146,14 @@ async def test_no_value_in_a_command_on_live_ends_the_line() -> None:
 @pytest.mark.parametrize("sign", [one for one in SIGNS if one != "nothing"])
 def test_a_message_on_mqtt_is_taken_clean_or_counted_once(sign: str) -> None:
     heard: list[Received] = []
-    counted: list[str] = []
-    reader = DirectReader(
-        "iveg",
-        ("AGI",),
-        lambda: at(1.0),
-        heard.append,
-        lambda _source, reason, _detail: counted.append(reason),
-    )
-    measure = orjson.loads(codec.write_navigation(Navigation("AGI", origin(), "row 4")))
+    intake = Ingest(World(("AGI",)), heard.append, ignore)
+    reader = DirectReader("iveg", ("AGI",), lambda: at(1.0), intake)
+    measure = orjson.loads(codec.write_measure(Navigation("AGI", origin(), "row 4")))
 
     for body in _with(measure, SIGNS[sign]):
-        before = len(heard) + len(counted)
+        before = intake.counters.total()
         reader.read("/iveg/AGI_nav/attrs", body.encode())
-        assert len(heard) + len(counted) == before + 1, body[:200]
+        assert intake.counters.total() == before + 1, body[:200]
 
     assert _unseen(orjson.dumps([one.observation for one in heard])) == set()
 

@@ -24,10 +24,11 @@ from iveg.domain.observations import (
     Navigation,
     Odometry,
     Origin,
+    ReportedObstacle,
     SafetyReport,
 )
+from iveg.domain.wire import MAX_TEXT, clean_text
 from iveg.ngsi import codec, names
-from iveg.ngsi.payloads import MAX_TEXT, clean_text
 
 alphabet = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.: áéñ"
 texts = st.text(alphabet, min_size=1, max_size=40)
@@ -66,7 +67,7 @@ def test_what_proves_an_age_survives_the_wire(
     )
     one = Odometry("AGI", said, Pose2D(0.0, 0.0, 0.0), Twist2D(0.0, 0.0))
 
-    (read,) = codec.read_measure("AGI_odom", codec.write_odometry(one)).observations
+    (read,) = codec.read_measure("AGI_odom", codec.write_measure(one)).observations
 
     assert isinstance(read, Odometry)
     assert read.origin == said
@@ -103,6 +104,8 @@ speed_limits = st.builds(
     maybe,
     thousandths(0, 99),
     maybe,
+    st.none() | thousandths(0, 9),
+    st.booleans(),
 )
 alerts = st.builds(
     FeedbackAlert,
@@ -114,12 +117,26 @@ alerts = st.builds(
     st.none() | st.tuples(metres, metres, metres),
     st.none() | thousandths(1, 6),
     maybe,
+    st.none() | st.tuples(thousandths(-3, 3), thousandths(-3, 3)),
+)
+
+
+def hundredths(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.integers(int(low * 100), int(high * 100)).map(lambda n: n / 100)
+
+
+obstacles = st.none() | st.builds(
+    ReportedObstacle,
+    hundredths(-99, 99),
+    hundredths(-99, 99),
+    hundredths(0, 9),
+    st.booleans(),
 )
 
 
 @given(st.builds(Odometry, st.just("AGI"), origins, poses, twists))
 def test_odometry_comes_back_as_it_went(value: Odometry) -> None:
-    reading = codec.read_measure("AGI_odom", codec.write_odometry(value))
+    reading = codec.read_measure("AGI_odom", codec.write_measure(value))
 
     assert reading == codec.ReadResult((value,))
 
@@ -134,7 +151,7 @@ def test_odometry_comes_back_as_it_went(value: Odometry) -> None:
     )
 )
 def test_detections_come_back_as_they_went(value: DetectionFrame) -> None:
-    written = codec.write_detections(value)
+    written = codec.write_measure(value)
 
     assert codec.read_measure("AGI_yolox_bounding_boxes", written) == codec.ReadResult(
         (value,)
@@ -156,11 +173,13 @@ def test_detections_come_back_as_they_went(value: DetectionFrame) -> None:
         thousandths(-3, 3),
         thousandths(-3, 3),
         st.none() | thousandths(0, 100),
+        peer_scans=st.booleans(),
+        obstacle=obstacles,
     )
 )
 def test_safety_reports_come_back_as_they_went(value: SafetyReport) -> None:
     assert codec.read_measure(
-        "AGI_safety", codec.write_safety(value)
+        "AGI_safety", codec.write_measure(value)
     ) == codec.ReadResult((value,))
 
 
@@ -176,7 +195,7 @@ def test_safety_reports_come_back_as_they_went(value: SafetyReport) -> None:
 )
 def test_navigation_comes_back_as_it_went(value: Navigation) -> None:
     assert codec.read_measure(
-        "AGI_nav", codec.write_navigation(value)
+        "AGI_nav", codec.write_measure(value)
     ) == codec.ReadResult((value,))
 
 
@@ -212,7 +231,7 @@ def test_scans_come_back_as_they_went(
         "AGI", origin, -1.5, 0.01, 0.1, 30.0, mount, np.array(ranges, np.float32)
     )
 
-    reading = codec.read_measure("AGI_lidar2D", codec.write_scan(value))
+    reading = codec.read_measure("AGI_lidar2D", codec.write_measure(value))
 
     (back,) = reading.observations
     assert isinstance(back, LaserScan)
@@ -255,6 +274,7 @@ def test_the_heartbeat_comes_back_as_it_went(origin: Origin) -> None:
         maybe,
         st.dictionaries(texts, speed_limits, max_size=4),
         st.dictionaries(texts, st.integers(0, 2**53), max_size=4),
+        foresight=st.booleans(),
     )
 )
 def test_feedback_comes_back_as_it_went(value: Feedback) -> None:

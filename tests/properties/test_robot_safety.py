@@ -98,7 +98,7 @@ def crowded(crowd: tuple[int, list[int], bool]) -> tuple[World, list[str]]:
 def read_back(world: World) -> SafetyReport:
     """The last report as iVeg reads it."""
     report = replace(world.reports[-1], origin=Origin("b", 1))
-    reading = codec.read_measure("AGI_safety", codec.write_safety(report))
+    reading = codec.read_measure("AGI_safety", codec.write_measure(report))
     (read,) = reading.observations
     assert isinstance(read, SafetyReport)
     return read

@@ -264,7 +264,7 @@ class StopOverBadTransports(RuleBasedStateMachine):
             payload = codec.write_answer(replace(effect.answer, origin=origin))
             reading = codec.read_answer("AGI", payload)
         else:
-            payload = codec.write_safety(replace(effect.report, origin=origin))
+            payload = codec.write_measure(replace(effect.report, origin=origin))
             reading = codec.read_measure("AGI_safety", payload)
             self.rig.machine.reported(origin.seq or 0, self.now)
             self.measured[origin.boot, origin.seq] = self.now

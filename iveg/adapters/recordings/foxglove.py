@@ -28,7 +28,7 @@ from iveg.domain.observations import (
     UnreadScan,
     kind_of,
 )
-from iveg.ngsi.codec import UNREAD, read_notification
+from iveg.ngsi.codec import read_notification
 
 Told = tuple[Channel, Mapping[str, Any]]
 """A message and its channel."""
@@ -147,9 +147,7 @@ class Drawing:
         self._at = Instant(0.0, 0.0)
         self._found: list[Observation] = []
         self._due: dict[_Stream, float] = {}
-        self._reader = DirectReader(
-            apikey, robots, lambda: self._at, self._draw_received, lambda *_: None
-        )
+        self._reader = DirectReader(apikey, robots, lambda: self._at, self)
 
     def messages(self, came: Incoming) -> Iterator[tuple[Channel, bytes]]:
         """Foxglove's messages of an input; none of what cannot be read."""
@@ -162,7 +160,7 @@ class Drawing:
 
     def _read(self, came: Incoming) -> None:
         if came.sort is Sort.NOTIFICATION:
-            _, reading = read_notification(came.payload, lambda *_: False, UNREAD)
+            _, reading = read_notification(came.payload, self.is_past)
             for one in reading.observations:
                 with contextlib.suppress(UnreadableError):
                     self._draw(one)
@@ -171,8 +169,20 @@ class Drawing:
             if stream is None or self._is_due(stream):
                 self._reader.read(came.name, came.payload)
 
-    def _draw_received(self, received: Received) -> None:
+    def enqueue(self, received: Received) -> None:
+        """Draw what the reader of measures has read."""
         self._draw(received.observation)
+
+    def reject(self, source: str, reason: str, detail: str = "") -> None:
+        """Draw nothing of what cannot be read."""
+
+    def is_early(self, *_: object) -> bool:
+        """None: what is not due was left before it was read."""
+        return False
+
+    def is_past(self, *_: object) -> bool:
+        """Nothing: each message is drawn once."""
+        return False
 
     def _draw(self, observation: Observation) -> None:
         """Have one drawn that is due.  Raises UnreadableError."""

@@ -89,7 +89,9 @@ def look_ahead(
     known = [one for one in zones if _goes_on_as_seen(one, now)]
     ahead = _Ahead(known, MovingZones([_row(one, world, now) for one in known]), rule)
     return {
-        robot.robot_id: ahead.of(robot, speeds_before.get(robot.robot_id), now)
+        robot.robot_id: ahead.encounters_of(
+            robot, speeds_before.get(robot.robot_id), now
+        )
         for robot in world.live_robots()
         if known and robot.odometry and robot.track.motion.speed >= MOVES_M_S
     }
@@ -128,17 +130,17 @@ class _Ahead:
     moving: MovingZones
     rule: DetectionRule
 
-    def of(
+    def encounters_of(
         self, robot: RobotState, speed_before: float | None, now: Instant
     ) -> Mapping[str, Encounter]:
         """The first encounter of a robot with each cause."""
-        found = self._on(path_of(robot, now), "slows", now)
+        found = self._met_on(path_of(robot, now), "slows", now)
         if speed_before is not None:
             faster = path_of(robot, now, speed_before)
-            found = {**self._on(faster, "holds", now), **found}
+            found = {**self._met_on(faster, "holds", now), **found}
         return found
 
-    def _on(
+    def _met_on(
         self, path: Path, effect: Literal["slows", "holds"], now: Instant
     ) -> dict[str, Encounter]:
         """A path's first encounter with each cause in whose zones it does not begin."""

@@ -159,8 +159,9 @@ def _with(
     slowed_s = defaultdict(float, done.slowed_s)
     for limit in filter(_slows, limits.values()):
         slowed_s[limit.reason] += passed_s
-    met = Counter(one.entry.zone.reason for one in changes if one.began)
-    return Doings(slowed_s, Counter(done.encounters) + met)
+    encounters = Counter(done.encounters)
+    encounters.update(one.entry.zone.reason for one in changes if one.began)
+    return Doings(slowed_s, encounters)
 
 
 def _rounded(done: Doings) -> Doings:

@@ -23,7 +23,7 @@ _ROUNDING_M = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Zone:
-    """The circle round a person or peer that slows every robot inside it.
+    """The surroundings of a person or peer, which slow every robot inside.
 
     Attributes:
         cause: The person or robot at its centre.
@@ -141,7 +141,7 @@ def distances_to_zones(
 
 
 def _distances(robot: RobotState, pose: Pose2D, zones: Iterable[Zone]) -> Distances:
-    """A robot's own zone, and those of other maps' recordings, are none of its."""
+    """The deepest zone of each cause, without its own and those of other maps."""
     nearest: Distances = {}
     for zone in zones:
         if zone.cause == robot.robot_id:

@@ -144,7 +144,8 @@ class ContextBroker:
         """Change attributes; create the missing ones; notify."""
         changed = entity.apply(changes, scope.now)
         for subscription in self.tenant(scope.service).subscriptions.values():
-            if subscription.wants(entity, changed):
+            if subscription.wants(entity, changed, scope.now):
+                subscription.sent_at = scope.now
                 self.outbox.post(subscription, entity)
 
     # --- updates that may have to be passed on ----------------------------------

@@ -18,6 +18,7 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    NonNegativeInt,
     PositiveInt,
     ValidationError,
     model_validator,
@@ -115,6 +116,7 @@ class SubscriptionDocument(Document):
     subject: Subject
     notification: Notification
     status: Literal["active", "inactive"] = "active"
+    throttling: NonNegativeInt | None = None
 
 
 def _read(raw: Mapping[str, Any]) -> SubscriptionDocument:
@@ -139,7 +141,7 @@ class Subscription:
         service: Tenant, as in the notification's header.
 
     Attributes:
-        sent: Number of its notifications.
+        sent: Number of its notifications; ``sent_at`` the moment of the last (Unix s).
         fails: Notifications without a response since the last one with any.
         failure: Reason of the last, in libcurl's words; empty for none.
 
@@ -154,13 +156,18 @@ class Subscription:
         self.document = _read(raw)
         self.service, self.path = service, path
         self.sent, self.fails, self.failure = 0, 0, ""
+        self.sent_at = float("-inf")
         self._raw = raw
 
-    def wants(self, entity: Entity, changed: Set[str]) -> bool:
-        """Whether a change of these attributes is to be notified."""
-        subject = self.document.subject
+    def wants(self, entity: Entity, changed: Set[str], now: float) -> bool:
+        """Whether a change of these attributes is to be notified.
+
+        What comes within the throttling of the last notification is never sent.
+        """
+        subject, throttling = self.document.subject, self.document.throttling or 0
         return (
-            not changed.isdisjoint(subject.condition.attrs or changed)
+            now - self.sent_at >= throttling
+            and not changed.isdisjoint(subject.condition.attrs or changed)
             and self.document.status == "active"
             and self.path == entity.path
             and any(subscribed.matches(entity) for subscribed in subject.entities)

@@ -21,7 +21,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 from iveg.adapters import clock
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.post_listener import post_listener
-from iveg.adapters.subscriptions import (
+from iveg.adapters.reconciler import (
     ALL_ROBOTS,
     WantedSubscription,
     write_subscription,

@@ -4,41 +4,37 @@
 """
 
 from iveg.domain.stamps import format_stamp, parse_stamp
-from iveg.ngsi.codec.attributes import IsPast, read_attributes
-from iveg.ngsi.codec.feedback import FeedbackWriter, read_feedback, write_feedback
+from iveg.ngsi.codec.feedback import (
+    FeedbackWriter,
+    read_feedback,
+    read_peer_scan,
+    write_feedback,
+    write_peer_scan,
+)
 from iveg.ngsi.codec.fields import MAX_DEPTH, ReadResult, UnreadPart, load_json
 from iveg.ngsi.codec.incoming import (
-    UNREAD,
+    IsPast,
     read_answer,
+    read_attributes,
     read_entity,
     read_measure,
     read_notification,
-    read_peer_scan,
+)
+from iveg.ngsi.codec.outgoing import (
+    write_answer,
+    write_climate,
     write_command,
     write_desired,
     write_goal,
-    write_peer_scan,
+    write_heartbeat,
+    write_measure,
     write_release,
     write_resume,
     write_stop,
 )
-from iveg.ngsi.codec.reports import (
-    write_answer,
-    write_climate,
-    write_detections,
-    write_goal_answer,
-    write_heartbeat,
-    write_navigation,
-    write_odometry,
-    write_safety,
-    write_scan,
-    write_sensed,
-    write_unplaced,
-)
 
 __all__ = [
     "MAX_DEPTH",
-    "UNREAD",
     "FeedbackWriter",
     "IsPast",
     "ReadResult",
@@ -57,19 +53,12 @@ __all__ = [
     "write_climate",
     "write_command",
     "write_desired",
-    "write_detections",
     "write_feedback",
     "write_goal",
-    "write_goal_answer",
     "write_heartbeat",
-    "write_navigation",
-    "write_odometry",
+    "write_measure",
     "write_peer_scan",
     "write_release",
     "write_resume",
-    "write_safety",
-    "write_scan",
-    "write_sensed",
     "write_stop",
-    "write_unplaced",
 ]

@@ -1,14 +1,13 @@
-"""Reading of the feedback that iVeg publishes for the fleet.
-
-Writing of the feedback that iVeg publishes for the fleet.
-"""
+"""What iVeg tells robots, both ways: feedback, and scans of their peers."""
 
 from collections.abc import Mapping
-from functools import lru_cache
+from dataclasses import replace
 from operator import is_
+from typing import Annotated, TypeVar
 
+import numpy as np
 import orjson
-from pydantic import ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.feedback import (
@@ -18,17 +17,26 @@ from iveg.domain.feedback import (
     FeedbackAlert,
     SpeedLimit,
 )
-from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.parameters import CLASSES, ROBOTS_HEAR, Class, Parameter, Sent
-from iveg.ngsi import payloads
+from iveg.domain.peer_scan import BEAMS, PLACES, PeerScan
+from iveg.domain.wire import MAX_ROBOTS, Text
 from iveg.ngsi.codec.fields import (
+    adapter,
     first_complaint,
     load_json,
-    read_origin,
-    rounded,
-    without_none,
+    read_message,
     write_origin,
 )
+
+T = TypeVar("T")
+
+# --- feedback ---------------------------------------------------------------------
+
+_NAMES = TypeAdapter[list[str]](Annotated[list[Text], Field(max_length=MAX_ROBOTS)])
+_ALERT = TypeAdapter(FeedbackAlert)
+_ALERTS = TypeAdapter(tuple[FeedbackAlert, ...])
+_LIMITS = TypeAdapter(dict[str, SpeedLimit])
 
 
 def read_feedback(payload: bytes) -> Feedback:
@@ -37,41 +45,24 @@ def read_feedback(payload: bytes) -> Feedback:
     Raises:
         UnreadableError: not a feedback; counts as no feedback (docs/safety.md).
     """
+    value = load_json(payload)
+    said = value if isinstance(value, dict) else {}
+    pose = said.get("robot_pose")
     try:
-        value = payloads.FeedbackValue.model_validate(load_json(payload))
+        clear = dict.fromkeys(_NAMES.validate_python(said.get("clear", [])), CLEAR)
+        feedback = read_message(
+            Feedback,
+            said.get("robot_id"),
+            value,
+            pose=pose,
+            twist=pose,
+            pose_stamp=pose.get("stamp") if isinstance(pose, dict) else None,
+            backlog_s=_backlog(said.get("backlog")),
+            rule=_rule(said.get("rule")),
+        )
     except ValidationError as error:
         raise UnreadableError("not_feedback", first_complaint(error)) from error
-    pose = value.robot_pose
-    return Feedback(
-        value.robot_id,
-        read_origin(value),
-        None if value.alert is None else _alert(value.alert),
-        tuple(_alert(alert) for alert in value.alerts),
-        None if pose is None else Pose2D(pose.x, pose.y, pose.yaw),
-        None if pose is None else Twist2D(pose.linear_velocity, pose.angular_velocity),
-        None if pose is None else pose.stamp,
-        _speed_limits(value),
-        value.seen,
-        _backlog(value.backlog),
-        value.foresight,
-        _rule(value.rule),
-    )
-
-
-def _speed_limits(value: payloads.FeedbackValue) -> dict[str, SpeedLimit]:
-    """Of every robot that is named."""
-    return dict.fromkeys(value.clear, CLEAR) | {
-        robot_id: SpeedLimit(
-            one.speed_factor,
-            one.reason,
-            one.cause,
-            one.distance_m,
-            one.decision_id,
-            one.foretold_s,
-            one.over,
-        )
-        for robot_id, one in value.speed_limits.items()
-    }
+    return replace(feedback, speed_limits=clear | {**feedback.speed_limits})
 
 
 def _backlog(value: object) -> float | None:
@@ -84,84 +75,60 @@ def _backlog(value: object) -> float | None:
 
 def _rule(value: object) -> Sent:
     """Values of the rule; what cannot be read is left out and never costs the rest."""
-    told = value if isinstance(value, dict) else {}
+    values = value if isinstance(value, dict) else {}
     return {
         row.name: read
         for row in ROBOTS_HEAR
-        if (read := _of_classes(row, told.get(row.name)))
+        if (read := _of_classes(row, values.get(row.name)))
     }
 
 
 def _of_classes(row: Parameter, value: object) -> Mapping[Class, float]:
-    told = value if isinstance(value, dict) else {}
+    values = value if isinstance(value, dict) else {}
     return {
-        class_: float(one)
+        class_: float(number)
         for class_ in CLASSES
-        if isinstance(one := told.get(class_), int | float)
-        and not isinstance(one, bool)
-        and row.least <= one <= row.most
+        if isinstance(number := values.get(class_), int | float)
+        and not isinstance(number, bool)
+        and row.least <= number <= row.most
     }
 
 
-def _alert(value: payloads.AlertValue) -> FeedbackAlert:
-    position, goes = value.position, value.velocity
-    return FeedbackAlert(
-        value.decision_id or "",
-        value.stamp or "",
-        value.class_,
-        value.class_id,
-        value.conf,
-        None if position is None else (position.x, position.y, position.z),
-        value.radius_m,
-        value.observer,
-        None if goes is None else (goes.x, goes.y),
-    )
-
-
 class FeedbackWriter:
-    """Writes feedback; what the messages of one telling share is written once."""
+    """Writes feedback; parts that the messages of one turn share are written once."""
 
     def __init__(self) -> None:
         self._shared: tuple[object, ...] = (None, None, None)
-        self._written: dict[str, orjson.Fragment] = {}
+        self._written: dict[str, object] = {}
 
     def write(self, feedback: Feedback) -> bytes:
         """The bytes of ``/{robot}/mqtt_feedback``."""
         shared = feedback.alerts, feedback.speed_limits, feedback.seen
         if not all(map(is_, shared, self._shared)):
             self._shared = shared
-            self._written = {
-                name: orjson.Fragment(orjson.dumps(value))
-                for name, value in _write_shared(feedback).items()
+            self._written = _write_shared(feedback)
+        alert, backlog_s = feedback.alert, feedback.backlog_s
+        fields: dict[str, object] = {
+            **write_origin(feedback.origin),
+            "robot_id": feedback.robot_id,
+            "alert": None if alert is None else _fragment(_ALERT, alert),
+            "robot_pose": _write_pose(feedback),
+            **self._written,
+        }
+        if backlog_s is not None:
+            fields["backlog"] = {
+                "fiware_s": round(min(backlog_s, LONGEST_BACKLOG_S), 1)
             }
-        return _write(feedback, self._written)
+        if feedback.foresight:
+            fields["foresight"] = True
+        if feedback.rule:
+            fields["rule"] = feedback.rule
+        return orjson.dumps(fields)
 
 
 def write_feedback(feedback: Feedback) -> bytes:
-    """The bytes of ``/{robot}/mqtt_feedback``."""
-    return _write(feedback, _write_shared(feedback))
-
-
-def _write(feedback: Feedback, shared: Mapping[str, object]) -> bytes:
-    alert = feedback.alert
-    return orjson.dumps(
-        {
-            **write_origin(feedback.origin),
-            "robot_id": feedback.robot_id,
-            "alert": None if alert is None else _write_alert(alert),
-            "robot_pose": _write_feedback_pose(feedback),
-            **shared,
-            **_write_backlog(feedback.backlog_s),
-            **({"foresight": True} if feedback.foresight else {}),
-            **({"rule": feedback.rule} if feedback.rule else {}),
-        }
-    )
-
-
-def _write_backlog(backlog_s: float | None) -> dict[str, object]:
-    if backlog_s is None:
-        return {}
-    return {"backlog": {"fiware_s": round(min(backlog_s, LONGEST_BACKLOG_S), 1)}}
+    """The bytes of one ``/{robot}/mqtt_feedback``."""
+    return FeedbackWriter().write(feedback)
 
 
 def _write_shared(feedback: Feedback) -> dict[str, object]:
@@ -170,73 +137,83 @@ def _write_shared(feedback: Feedback) -> dict[str, object]:
     Of a robot that is clear the id alone is written, or the fleet's limits would be
     most of the message; a robot that is named nowhere is unsupervised.
     """
+    limits = feedback.speed_limits
+    limited = {name: limit for name, limit in limits.items() if limit != CLEAR}
     return {
-        "alerts": [_write_alert(alert) for alert in feedback.alerts],
-        "speed_limits": {
-            robot_id: _write_speed_limit(speed_limit)
-            for robot_id, speed_limit in feedback.speed_limits.items()
-            if speed_limit != CLEAR
-        },
-        "clear": [
-            robot_id
-            for robot_id, speed_limit in feedback.speed_limits.items()
-            if speed_limit == CLEAR
-        ],
-        "seen": dict(feedback.seen),
+        "alerts": _fragment(_ALERTS, feedback.alerts),
+        "speed_limits": _fragment(_LIMITS, limited),
+        "clear": [name for name in limits if name not in limited],
+        "seen": feedback.seen,
     }
 
 
-def _write_speed_limit(speed_limit: SpeedLimit) -> dict[str, object]:
-    return without_none(
-        {
-            "speed_factor": speed_limit.speed_factor,
-            "reason": speed_limit.reason,
-            "cause": speed_limit.cause,
-            "distance_m": rounded(speed_limit.distance_m),
-            "decision_id": speed_limit.decision_id,
-            "foretold_s": rounded(speed_limit.foretold_s),
-            "over": speed_limit.over or None,
-        }
-    )
+def _fragment(of: TypeAdapter[T], value: T) -> orjson.Fragment:
+    """JSON by declaration; what is not known is absent, never ``null``."""
+    return orjson.Fragment(of.dump_json(value, by_alias=True, exclude_none=True))
 
 
-def _write_alert(alert: FeedbackAlert) -> dict[str, object]:
-    return without_none(
-        {
-            "decision_id": alert.decision_id or None,
-            "class": alert.class_,
-            "class_id": alert.class_id,
-            "conf": rounded(alert.confidence),
-            "position": _write_vector("xyz", alert.position),
-            "radius_m": rounded(alert.radius_m),
-            "stamp": alert.stamp,
-            "observer": alert.observer,
-            "velocity": _write_vector("xy", alert.velocity),
-        }
-    )
-
-
-@lru_cache(maxsize=512)
-def _write_vector(
-    axes: str, vector: tuple[float, ...] | None
-) -> orjson.Fragment | None:
-    """Of a ring it stays the same for as long as nobody looks there anew."""
-    if vector is None:
-        return None
-    return orjson.Fragment(
-        orjson.dumps(dict(zip(axes, map(rounded, vector), strict=True)))
-    )
-
-
-def _write_feedback_pose(feedback: Feedback) -> dict[str, object] | None:
+def _write_pose(feedback: Feedback) -> dict[str, object] | None:
     if feedback.pose is None:
         return None
-    twist = feedback.twist or Twist2D(0.0, 0.0)
-    return {
-        "x": feedback.pose.x,
-        "y": feedback.pose.y,
-        "yaw": feedback.pose.yaw,
-        "linear_velocity": twist.linear_x,
-        "angular_velocity": twist.angular_z,
-        "stamp": feedback.pose_stamp,
+    pose = adapter(Pose2D).dump_python(feedback.pose)
+    twist = adapter(Twist2D).dump_python(feedback.twist or REST, by_alias=True)
+    return {**pose, **twist, "stamp": feedback.pose_stamp}
+
+
+# --- peers' scans -----------------------------------------------------------------
+
+LARGEST = 1024
+"""Size of a peer's scan at most (bytes)."""
+_FULL = Field(min_length=BEAMS, max_length=BEAMS)
+_Range = Annotated[float, Field(strict=True, ge=0, le=1e4)]
+_RANGES = TypeAdapter[list[float | None]](Annotated[list[_Range | None], _FULL])
+_PLACES = TypeAdapter[list[int]](
+    Annotated[list[Annotated[int, Field(strict=True, ge=0, lt=PLACES)]], _FULL]
+)
+
+
+def write_peer_scan(scan: PeerScan) -> bytes:
+    """The bytes of ``/{robot}/iveg/peer_scan``."""
+    centimetres = scan.ranges.astype(np.float64).round(2).tolist()
+    fields = adapter(PeerScan).dump_python(
+        scan, by_alias=True, exclude={"origin", "ranges", "places"}
+    )
+    fields["robot_pose"]["frame_id"] = "map"
+    identity = {
+        "boot": scan.origin.boot,
+        "seq": scan.origin.seq,
+        "stamp": scan.origin.stamp,
+        "ranges": [None if length == np.inf else length for length in centimetres],
+        "places": scan.places.tolist(),
     }
+    return orjson.dumps(fields | identity)
+
+
+def read_peer_scan(robot_id: str, payload: bytes) -> PeerScan:
+    """Read ``/{robot}/iveg/peer_scan``.
+
+    Raises:
+        UnreadableError: ``too_large``, ``not_json``, ``not_a_peer_scan``, or
+            ``another_robot`` than ``robot_id``.
+    """
+    if len(payload) > LARGEST:
+        raise UnreadableError("too_large", f"{len(payload)} bytes")
+    value = load_json(payload)
+    said = value if isinstance(value, dict) else {}
+    try:
+        ranges = _RANGES.validate_python(said.get("ranges"))
+        places = _PLACES.validate_python(said.get("places"))
+        scan = read_message(
+            PeerScan,
+            said.get("robot_id"),
+            value,
+            ranges=np.array([np.inf if r is None else r for r in ranges], np.float32),
+            places=np.array(places, np.uint8),
+        )
+    except ValidationError as error:
+        raise UnreadableError("not_a_peer_scan", first_complaint(error)) from error
+    if scan.robot_id != robot_id:
+        raise UnreadableError("another_robot", scan.robot_id)
+    if said["robot_pose"].get("frame_id") != "map":
+        raise UnreadableError("not_a_peer_scan", "robot_pose is not in map")
+    return scan

@@ -1,29 +1,31 @@
-"""Fields that several messages share: who said it and when, holds, round numbers.
+"""Messages as JSON: parsing of what may be hostile, and reading and writing by type.
 
-Parsing of untrusted JSON, and the parts that could not be read.
+What cannot be read becomes an ``UnreadPart`` beside what can.
 """
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any, TypeVar, get_type_hints
 
 import orjson
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.kinds import KINDS
 from iveg.domain.observations import (
     EntityReading,
     FeedbackRef,
-    Hold,
-    LaserScan,
     Observation,
     Origin,
 )
 from iveg.domain.stamps import parse_stamp
-from iveg.ngsi import names, payloads
+from iveg.domain.wire import IN_MESSAGE, clean_text
+from iveg.ngsi import names
 
 MAX_DEPTH = 32
 _CONTAINERS = frozenset({dict, list})
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +54,9 @@ class ReadResult:
     observations: tuple[Observation, ...] = ()
     problems: tuple[UnreadPart, ...] = ()
     equipment: tuple[EntityReading, ...] = ()
+
+
+# --- JSON -------------------------------------------------------------------------
 
 
 def load_json(body: bytes | str) -> object:
@@ -95,39 +100,91 @@ def unread(source: str, reason: str, detail: str = "") -> ReadResult:
 
 def merge(readings: Iterable[ReadResult]) -> ReadResult:
     """Several readings as one, in order."""
-    observations: list[Observation] = []
-    problems: list[UnreadPart] = []
-    equipment: list[EntityReading] = []
-    for reading in readings:
-        observations.extend(reading.observations)
-        problems.extend(reading.problems)
-        equipment.extend(reading.equipment)
-    return ReadResult(tuple(observations), tuple(problems), tuple(equipment))
+    readings = tuple(readings)
+    return ReadResult(
+        tuple(one for reading in readings for one in reading.observations),
+        tuple(one for reading in readings for one in reading.problems),
+        tuple(one for reading in readings for one in reading.equipment),
+    )
 
 
 def first_complaint(error: ValidationError) -> str:
     """The first complaint of pydantic, without echoing the input."""
     complaint = error.errors(include_input=False, include_url=False)[0]
     place = ".".join(str(part) for part in complaint["loc"])
-    return payloads.clean_text(f"{place}: {complaint['msg']}")
+    return clean_text(f"{place}: {complaint['msg']}")
 
 
-def read_origin(value: payloads.OriginFields) -> Origin:
-    """Read boot, sequence number, time, and the newest feedback of the sender."""
-    stamp_s = None if value.stamp is None else parse_stamp(value.stamp)
-    heard = value.heard
-    return Origin(
-        value.boot,
-        value.seq,
-        value.stamp,
-        stamp_s,
-        value.mono,
-        # A robot without feedback yet sends ``null``.
-        acknowledgements="heard" in value.model_fields_set,
-        heard=None if heard is None else FeedbackRef(heard.boot, heard.seq),
-        heard_also=tuple(FeedbackRef(one.boot, one.seq) for one in value.heard_also),
-        replay=value.replay,
+# --- messages ---------------------------------------------------------------------
+
+
+_ADAPTERS: dict[type, TypeAdapter[Any]] = {}
+_SPREAD: dict[type, tuple[str, ...]] = {}
+
+
+def adapter(message: type[T]) -> TypeAdapter[T]:
+    """Reader and writer of a declared message; the same one each time."""
+    if message not in _ADAPTERS:
+        _ADAPTERS[message] = TypeAdapter(message)
+        hints = get_type_hints(message, include_extras=True).items()
+        _SPREAD[message] = tuple(
+            name
+            for name, hint in hints
+            if IN_MESSAGE in getattr(hint, "__metadata__", ())
+        )
+    return _ADAPTERS[message]
+
+
+for _kind in KINDS:
+    # Built at the start, not while the first message waits.
+    adapter(_kind.of)
+
+_OBJECT = TypeAdapter(dict[str, Any])
+_ORIGIN = TypeAdapter(Origin)
+
+
+def read_message(
+    message: type[T], robot_id: object, value: object, **parts: object
+) -> T:
+    """Read a robot's message by its declaration.
+
+    Args:
+        message: Its type.
+        robot_id: Who sent it.
+        value: The object on the wire.
+        parts: Members that are read already.
+
+    Raises:
+        ValidationError: it is not as declared.
+    """
+    reader, members = adapter(message), _OBJECT.validate_python(value)
+    members |= {"robot_id": robot_id, "origin": _origin(members), **parts}
+    for name in _SPREAD[message]:
+        members[name] = value
+    return reader.validate_python(members)
+
+
+def write_message(message: Observation) -> dict[str, Any]:
+    """The object on the wire, without robot and origin."""
+    members: dict[str, Any] = adapter(type(message)).dump_python(
+        message, by_alias=True, exclude={"robot_id", "origin"}
     )
+    for name in _SPREAD[type(message)]:
+        members |= members.pop(name)
+    return members
+
+
+def read_origin(value: object) -> Origin:
+    """Read boot, sequence number, time, and the newest feedback of the sender."""
+    return _origin(_OBJECT.validate_python(value))
+
+
+def _origin(members: dict[str, Any]) -> Origin:
+    stamp = members.get("stamp")
+    seconds = parse_stamp(clean_text(stamp)) if isinstance(stamp, str) else None
+    # A robot without feedback yet sends ``null``.
+    derived = {"stamp_s": seconds, "acknowledgements": "heard" in members}
+    return _ORIGIN.validate_python(members | derived)
 
 
 _PROOF = ("mono", "heard", "heard_also", "replay")
@@ -139,8 +196,7 @@ def read_stamped(attributes: Mapping[str, object]) -> Origin:
     if not isinstance(pose, dict):
         pose = {}
     fields = {key: pose[key] for key in _PROOF if key in pose}
-    fields["stamp"] = attributes.get("timestamp")
-    return read_origin(payloads.OriginFields.model_validate(fields))
+    return read_origin({**fields, "stamp": attributes.get("timestamp")})
 
 
 def refuse_unplaced(value: object) -> None:
@@ -170,48 +226,3 @@ def write_origin(origin: Origin) -> dict[str, object]:
 
 def _write_ref(heard: FeedbackRef | None) -> dict[str, object] | None:
     return None if heard is None else {"boot": heard.boot, "seq": heard.seq}
-
-
-def read_holds(values: Iterable[payloads.HoldValue]) -> tuple[Hold, ...]:
-    """Why a robot may not move."""
-    return tuple(Hold(value.id, value.source, value.ack) for value in values)
-
-
-def write_hold(hold: Hold) -> dict[str, str]:
-    """One hold of a robot's report."""
-    return {"id": hold.id, "source": hold.source, "ack": hold.ack}
-
-
-def write_motion(pose: Pose2D, twist: Twist2D) -> dict[str, object]:
-    """Pose and twist of an odometry."""
-    return {
-        "x": round(pose.x, 4),
-        "y": round(pose.y, 4),
-        "yaw": round(pose.yaw, 5),
-        "linear_velocity": round(twist.linear_x, 4),
-        "angular_velocity": round(twist.angular_z, 4),
-    }
-
-
-def write_lidar_header(scan: LaserScan, origin: dict[str, object]) -> dict[str, object]:
-    """``lidar_header``, with the origin of its message."""
-    return {
-        "angle_min": scan.angle_min,
-        "angle_increment": scan.angle_increment,
-        "range_min": scan.range_min,
-        "range_max": scan.range_max,
-        "x": scan.mount.x,
-        "y": scan.mount.y,
-        "yaw": scan.mount.yaw,
-        **origin,
-    }
-
-
-def rounded(value: float | None) -> float | None:
-    """To a tenth of a millimetre, or of a thousandth."""
-    return None if value is None else round(value, 4)
-
-
-def without_none(fields: dict[str, object]) -> dict[str, object]:
-    """Only what is known: absent, never ``null``."""
-    return {name: value for name, value in fields.items() if value is not None}

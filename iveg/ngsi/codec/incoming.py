@@ -1,80 +1,277 @@
-"""From Orion's notifications to observations.
+"""Reading of what robots and Orion send: measures, answers, entities, notifications.
 
-A part that cannot be read becomes a ``Problem`` beside its neighbours and never hurts
-them.
-
-Scans that wait to be read: identity orders them, and numbers are for eyes.
-
-Measures and answers of robots, straight from their topics.
-
-Orders to one robot: a command, or the retained desired state.
-
-Scans that iVeg hands on to robots which ask for them, both ways.
+A part that cannot be read becomes a problem beside its neighbours and never hurts
+them.  Most kinds are read by their declaration alone; frames, scans and the single
+payload of Algorithm 1 have readers of their own.
 """
 
-from collections.abc import Container, Iterable, Mapping
+import math
+from array import array
+from collections.abc import Callable, Container, Mapping
+from dataclasses import replace
 from functools import partial
-from typing import Literal
+from typing import Annotated, Any
 
 import numpy as np
-import orjson
-from pydantic import ValidationError
+from numpy.typing import NDArray
+from pydantic import Field, TypeAdapter, ValidationError
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.geometry import Pose2D
-from iveg.domain.goals import CancelOrder, GoalOrder
-from iveg.domain.kinds import KIND_OF
+from iveg.domain.frames import may_be_laser_frame
+from iveg.domain.kinds import KIND_OF, SENSED
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
+    Climate,
+    CommandAnswer,
+    CommandStatus,
+    Detection,
     DetectionFrame,
     EntityReading,
+    GoalAnswer,
+    HeartbeatProbe,
     LaserScan,
+    Navigation,
+    Observation,
+    Odometry,
     Origin,
+    Overtaken,
+    RefusedFrame,
+    SafetyReport,
     UnreadScan,
 )
-from iveg.domain.peer_scan import PeerScan
-from iveg.ngsi import names, payloads
-from iveg.ngsi.codec.attributes import (
-    NO_OTHERS,
-    IsPast,
-    Readers,
-    climate,
-    command_answer,
-    compact,
-    goal_answer,
-    heartbeat,
-    read_attributes,
-    read_one,
-    refuse_elsewhere,
-    refused_frame,
+from iveg.domain.wire import (
+    MAX_BEAMS,
+    MAX_BOXES,
+    MAX_RANGE_M,
+    LidarPoints,
+    Metres,
+    Text,
+    Wire,
+    clean_text,
+    place,
 )
+from iveg.ngsi import names
 from iveg.ngsi.codec.fields import (
     ReadResult,
+    adapter,
     first_complaint,
     load_json,
     merge,
+    read_message,
     read_origin,
+    read_stamped,
     refuse_unplaced,
-    rounded,
     unread,
 )
 
+Reader = Callable[[str, Mapping[str, object]], Observation]
+IsPast = Callable[[str, type[Observation], str, int], bool]
+"""Whether robot, kind, boot and seq tell that a message cannot be news."""
 
-def _unread_scan(
-    name: str, robot_id: str, attributes: Mapping[str, object]
-) -> UnreadScan:
-    """A scan by its identity alone."""
+# --- detection frames -------------------------------------------------------------
+
+_BOX = TypeAdapter(Detection)
+_BOXES: TypeAdapter[list[Detection]] = TypeAdapter(list[Detection])
+_POINT: TypeAdapter[tuple[float, float, float]] = TypeAdapter(
+    Annotated[tuple[Metres, Metres, Metres], *place("xyz")]
+)
+_LONGEST_M = 2 * LIMITS.zone_most_m
+"""A box that is longer says no place."""
+_HALF_M = 0.25
+"""Algorithm 1 sends a point; it is drawn as a box of half a metre."""
+
+
+def _read_frame(robot_id: str, attributes: Mapping[str, object]) -> DetectionFrame:
+    """Read ``bounding_boxes`` and its header."""
+    boxes = attributes[names.BOXES]
+    if isinstance(boxes, dict):
+        boxes = [boxes]
+    if not isinstance(boxes, list) or len(boxes) > MAX_BOXES:
+        raise UnreadableError("bad_bounding_boxes", "neither a box nor a short list")
+    header = attributes.get(names.BOXES_HEADER)
+    parts = _sorted_boxes(boxes)
+    if header is None:
+        return DetectionFrame(robot_id, Origin(), **parts)
+    return read_message(DetectionFrame, robot_id, header, **parts)
+
+
+def _sorted_boxes(boxes: list[object]) -> dict[str, Any]:
+    """Detections of a frame, and the classes of the boxes that say no place."""
+    try:
+        read: list[Detection | None] = [*_BOXES.validate_python(boxes)]
+    except ValidationError:
+        read = list(map(_detection, boxes))
+    found, classes = [], []
+    for box, detection in zip(boxes, read, strict=True):
+        if detection is not None and _is_somewhere(detection):
+            found.append(detection)
+        else:
+            classes.append(_class_of(box))
+    return {"detections": tuple(found), "unread": tuple(classes)}
+
+
+def _detection(raw: object) -> Detection | None:
+    try:
+        return _BOX.validate_python(raw)
+    except ValidationError:
+        return None
+
+
+def _is_somewhere(detection: Detection) -> bool:
+    box = detection.box
+    return (
+        detection.frame_id != names.UNPLACED
+        and any((box.xmin, box.xmax, box.ymin, box.ymax))
+        and max(box.longer_side, box.zmax - box.zmin) <= _LONGEST_M
+    )
+
+
+def _class_of(box: object) -> str | None:
+    class_id = box.get("class_id") if isinstance(box, dict) else None
+    return clean_text(class_id) if isinstance(class_id, str) else None
+
+
+def _read_single_detection(
+    robot_id: str, attributes: Mapping[str, object]
+) -> DetectionFrame:
+    """Read the one detection of Algorithm 1's payload."""
+    box = {
+        "class_id": attributes["class"],
+        "probability": attributes.get("conf"),
+        "frame_id": "map",
+        "position": _sides_about(attributes.get("position_3D")),
+    }
+    return DetectionFrame(robot_id, read_stamped(attributes), **_sorted_boxes([box]))
+
+
+def _sides_about(raw: object) -> dict[str, float] | None:
+    """Sides of the box about a point; None where it is none, or three zeros."""
+    try:
+        centre = dict(zip("xyz", _POINT.validate_python(raw), strict=True))
+    except ValidationError:
+        return None
+    if not any(centre.values()):
+        return None
+    return {
+        axis + side: value + sign * _HALF_M
+        for axis, value in centre.items()
+        for side, sign in (("min", -1), ("max", 1))
+    }
+
+
+# --- scans ------------------------------------------------------------------------
+
+_POINTS: TypeAdapter[list[float | None]] = TypeAdapter(LidarPoints)
+_FRAME_NAME: TypeAdapter[str | None] = TypeAdapter(Text | None)
+_UNSAID = {"range_min": 0.0, "x": 0.0, "y": 0.0, "yaw": 0.0}
+"""Members of a header that may lack."""
+_TURN = math.tau + 0.1
+"""Drivers close their turn with a beam or two more (rad)."""
+_FINEST = 1e-4
+"""No laser is finer (rad); whoever draws a turn of beams needs room for each."""
+
+
+def _read_scan(
+    points: str, robot_id: str, attributes: Mapping[str, object]
+) -> LaserScan:
+    """Read a sweep, whose numbers stand in attribute ``points``, and its header."""
+    ranges = _read_ranges(attributes[points])
     header = attributes.get(names.LIDAR_HEADER)
-    origin = Origin()
-    if header is not None:
-        refuse_unplaced(header)
-        label = payloads.ScanLabelValue.model_validate(header)
-        refuse_elsewhere(robot_id, label)
-        origin = read_origin(label)
-    kept = {name: compact(attributes[name]), names.LIDAR_HEADER: header}
-    return UnreadScan(robot_id, origin, partial(_read, robot_id, kept))
+    if header is None:
+        header = {
+            "angle_min": -math.pi,
+            "angle_increment": math.tau / max(1, ranges.size),
+            "range_max": 1e4,
+        }
+    _refuse_elsewhere(robot_id, header)
+    if isinstance(header, dict):
+        header = _UNSAID | header
+    scan = read_message(LaserScan, robot_id, header, ranges=ranges)
+    _refuse_impossible(scan)
+    # The one beam of a scan needs no increment, but whoever draws it does.
+    return scan if ranges.size > 1 else replace(scan, angle_increment=_FINEST)
 
 
-def _read(robot_id: str, attributes: Mapping[str, object]) -> LaserScan:
+def _read_ranges(points: object) -> NDArray[np.float32]:
+    """A scan's numbers as one buffer; inf where nothing came back.
+
+    Raises:
+        ValidationError: not a list of at most 4,096 numbers and nulls in range.
+    """
+    buffer = _compact(points)
+    if isinstance(buffer, np.ndarray):
+        return buffer
+    return ranges_of(_POINTS.validate_python(points))
+
+
+def ranges_of(points: list[float | None]) -> NDArray[np.float32]:
+    """Numbers of a scan (m); inf where nothing came back."""
+    ranges = np.array(points, np.float32)
+    ranges[np.isnan(ranges)] = np.inf
+    return ranges
+
+
+def _compact(points: object) -> object:
+    """Numbers as one buffer where nothing has to be judged; else what was given.
+
+    That is: no null, no bool, all in range.  Hundreds of Python's numbers would have
+    left the processor's cache when the scan is drawn.
+    """
+    if type(points) is not list or not 0 < len(points) <= MAX_BEAMS:
+        return points
+    try:
+        numbers = np.frombuffer(array("d", points))
+    except (TypeError, OverflowError):
+        return points
+    # A bool looks like 0 or 1 here.  "Not" also refuses NaN, which no JSON has.
+    if not (numbers.min() >= 0.0 and numbers.max() <= MAX_RANGE_M):
+        return points
+    if np.any(numbers == 0.0) or np.any(numbers == 1.0):
+        return points
+    return numbers.astype(np.float32)
+
+
+def _refuse_impossible(scan: LaserScan) -> None:
+    """Refuse a sweep that no laser makes.
+
+    Raises:
+        UnreadableError: its beams do not turn, turn more than once, or count nothing.
+    """
+    increment, beams = abs(scan.angle_increment), scan.ranges.size
+    if increment < _FINEST and beams > 1:
+        raise UnreadableError("bad_lidar_header", "angle_increment is 0 or nearly so")
+    if increment * (beams - 1) > _TURN:
+        raise UnreadableError("bad_lidar_header", "beams turn more than once round")
+    if not 0.0 <= scan.range_min < scan.range_max:
+        raise UnreadableError("bad_lidar_header", "range_min is not below range_max")
+
+
+def _refuse_elsewhere(robot_id: str, header: object) -> None:
+    """Refuse a scan that is in no frame of a laser on this robot.
+
+    Raises:
+        UnreadableError: ``unplaced`` or ``unknown_frame``.
+    """
+    refuse_unplaced(header)
+    if not isinstance(header, dict):
+        return
+    frame = _FRAME_NAME.validate_python(header.get("frame_id"))
+    if frame and not may_be_laser_frame(frame, robot_id):
+        raise UnreadableError("unknown_frame", f"{names.LIDAR}: {frame}")
+
+
+def _identify_scan(
+    points: str, robot_id: str, attributes: Mapping[str, object]
+) -> UnreadScan:
+    """Read a scan's identity alone: its numbers are for eyes, which read them once."""
+    header = attributes.get(names.LIDAR_HEADER)
+    _refuse_elsewhere(robot_id, header)
+    origin = Origin() if header is None else read_origin(header)
+    kept = {points: _compact(attributes[points]), names.LIDAR_HEADER: header}
+    return UnreadScan(robot_id, origin, partial(_read_later, robot_id, kept))
+
+
+def _read_later(robot_id: str, attributes: Mapping[str, object]) -> LaserScan:
     """The scan.
 
     Raises:
@@ -88,62 +285,189 @@ def _read(robot_id: str, attributes: Mapping[str, object]) -> LaserScan:
     raise UnreadableError(problem.reason, problem.detail)
 
 
-UNREAD: Readers = {
-    name: partial(_unread_scan, name) for name in (names.LIDAR, "laser_scan")
-}
-"""Readers that leave scans to those who draw them."""
+# --- attributes -------------------------------------------------------------------
 
+
+def _read_odometry(robot_id: str, attributes: Mapping[str, object]) -> Odometry:
+    refuse_unplaced(attributes[names.ODOMETRY])
+    return read_message(Odometry, robot_id, attributes[names.ODOMETRY])
+
+
+def _read_status(robot_id: str, attributes: Mapping[str, object]) -> CommandStatus:
+    return CommandStatus(robot_id, clean_text(str(attributes[names.COMMAND_STATUS])))
+
+
+def _read_single_pose(robot_id: str, attributes: Mapping[str, object]) -> Odometry:
+    """Read the pose of Algorithm 1's payload, whose stamp may stand beside it."""
+    odometry = read_message(Odometry, robot_id, attributes["pose"])
+    if odometry.origin.stamp is not None:
+        return odometry
+    return replace(odometry, origin=read_stamped(attributes))
+
+
+def _declared(message: type[Observation], name: str) -> Reader:
+    """Reader of an attribute that is as its message is declared."""
+
+    def read(robot_id: str, attributes: Mapping[str, object]) -> Observation:
+        return read_message(message, robot_id, attributes[name])
+
+    return read
+
+
+# In this order: where a robot is counts for what it sees there.
+_READERS: Mapping[str, Reader] = {
+    names.ODOMETRY: _read_odometry,
+    names.LIDAR: partial(_read_scan, names.LIDAR),
+    names.BOXES: _read_frame,
+    names.SAFETY: _declared(SafetyReport, names.SAFETY),
+    names.NAVIGATION: _declared(Navigation, names.NAVIGATION),
+    names.COMMAND_STATUS: _read_status,
+    names.COMMAND_INFO: _declared(CommandAnswer, names.COMMAND_INFO),
+    names.GOAL_INFO: _declared(GoalAnswer, names.GOAL_INFO),
+    "pose": _read_single_pose,
+    "laser_scan": partial(_read_scan, "laser_scan"),
+    "class": _read_single_detection,
+    **{kind.name: _declared(kind.of, kind.name) for kind in SENSED},
+}
+_RANK = {name: rank for rank, name in enumerate(_READERS)}
+_FRAMES = frozenset({names.BOXES, "class"})
+_IDENTIFIERS: Mapping[str, Reader] = {
+    name: partial(_identify_scan, name) for name in (names.LIDAR, "laser_scan")
+}
+_IDENTITY: Mapping[str, tuple[type[Odometry | LaserScan | DetectionFrame], str]] = {
+    names.ODOMETRY: (Odometry, names.ODOMETRY),
+    names.LIDAR: (LaserScan, names.LIDAR_HEADER),
+    names.BOXES: (DetectionFrame, names.BOXES_HEADER),
+}
+"""Attributes that carry the origin (boot, seq) of telemetry."""
+
+
+def read_attributes(
+    robot_id: str, attributes: Mapping[str, object], is_past: IsPast | None = None
+) -> ReadResult:
+    """Read every attribute of a robot that the contract knows; skip the others.
+
+    Args:
+        robot_id: Whose they are.
+        attributes: By name.
+        is_past: Tells by its identity what need not be read; numbers of scans are left
+            to those who draw them.  None reads all.
+    """
+    readings = []
+    for name in sorted(attributes.keys() & _READERS.keys(), key=_RANK.__getitem__):
+        if attributes[name] is None:
+            continue
+        reader = _READERS[name]
+        if is_past is not None:
+            reader = _IDENTIFIERS.get(name, reader)
+            if old := _overtaken(robot_id, name, attributes, is_past):
+                readings.append(old)
+                continue
+        readings.append(_read(robot_id, reader, attributes, name))
+    return readings[0] if len(readings) == 1 else merge(readings)
+
+
+def _overtaken(
+    robot_id: str, name: str, attributes: Mapping[str, object], is_past: IsPast
+) -> ReadResult | None:
+    """Remains of a message that is older than its stream; None where it may be new."""
+    kind, holder = _IDENTITY.get(name, (None, ""))
+    raw = attributes.get(holder)
+    if kind is None or type(raw) is not dict:
+        return None
+    boot, seq = raw.get("boot"), raw.get("seq")
+    if type(boot) is not str or type(seq) is not int:
+        return None
+    if not is_past(robot_id, kind, clean_text(boot), seq):
+        return None
+    try:
+        return ReadResult((Overtaken(robot_id, read_origin(raw), kind),))
+    except ValidationError:
+        return None
+
+
+def _read(
+    source: str, reader: Reader, attributes: Mapping[str, object], name: str
+) -> ReadResult:
+    """Result of one reader on an entity, or the reason of its failure."""
+    try:
+        names.refuse_another_robot(source, attributes, name)
+        return ReadResult((reader(source, attributes),))
+    except ValidationError as error:
+        read = unread(source, f"bad_{name}", first_complaint(error))
+    except UnreadableError as error:
+        read = unread(source, error.reason, error.detail)
+    except Exception as error:
+        # A value that no bound foresaw is that message's end and nobody else's.
+        read = unread(source, f"bad_{name}", repr(error))
+    return _refused_frame(source, read) if name in _FRAMES else read
+
+
+def _refused_frame(robot_id: str, read: ReadResult) -> ReadResult:
+    """A detection frame that cannot be read: a problem, and no empty picture."""
+    return replace(read, observations=(RefusedFrame(robot_id),))
+
+
+# --- messages of robots -----------------------------------------------------------
 
 _FRAME_SUFFIX = KIND_OF[DetectionFrame].suffix or ""
+_COMMAND = _declared(CommandAnswer, names.COMMAND)
+_GOAL = _declared(GoalAnswer, names.GOAL)
 
 
 def read_measure(
-    device_id: str,
-    payload: bytes,
-    is_past: IsPast | None = None,
-    instead: Readers = NO_OTHERS,
+    device_id: str, payload: bytes, is_past: IsPast | None = None
 ) -> ReadResult:
     """Read what a robot's device published on its ``attrs`` topic."""
     robot_id = names.robot_of_device(device_id)
     if not names.is_robot_id(robot_id):
-        return unread(payloads.clean_text(device_id), "bad_robot_id")
+        return unread(clean_text(device_id), "bad_robot_id")
     try:
-        attributes = load_json(payload)
+        return read_attributes(robot_id, _load_object(payload), is_past)
     except UnreadableError as error:
         read = unread(device_id, error.reason, error.detail)
-    else:
-        if isinstance(attributes, dict):
-            return read_attributes(robot_id, attributes, is_past, instead)
-        read = unread(device_id, "not_an_object")
     is_frame = device_id == robot_id + _FRAME_SUFFIX
-    return refused_frame(robot_id, read) if is_frame else read
+    return _refused_frame(robot_id, read) if is_frame else read
+
+
+def _load_object(payload: bytes) -> dict[str, object]:
+    value = load_json(payload)
+    if not isinstance(value, dict):
+        raise UnreadableError("not_an_object")
+    return value
 
 
 def read_answer(robot_id: str, payload: bytes) -> ReadResult:
     """Read a robot's answer on its ``cmdexe`` topic."""
     try:
-        value = load_json(payload)
+        value = _load_object(payload)
     except UnreadableError as error:
         return unread(robot_id, error.reason, error.detail)
-    if not isinstance(value, dict):
-        return unread(robot_id, "not_an_object")
     if names.GOAL in value and names.COMMAND not in value:
-        return read_one(robot_id, goal_answer, value, names.GOAL)
-    return read_one(robot_id, command_answer, value, names.COMMAND)
+        return _read(robot_id, _GOAL, value, names.GOAL)
+    return _read(robot_id, _COMMAND, value, names.COMMAND)
+
+
+# --- entities of Orion ------------------------------------------------------------
+
+
+class _Notification(Wire):
+    """A notification of Orion; entities are read attribute by attribute."""
+
+    subscriptionId: Text  # noqa: N815 - NGSI name
+    data: Annotated[list[dict[str, object]], Field(max_length=1000)]
 
 
 def read_notification(
     body: bytes,
     is_past: IsPast | None = None,
-    instead: Readers = NO_OTHERS,
     equipment: Container[tuple[str, str]] = frozenset(),
 ) -> tuple[str, ReadResult]:
     """Read a notification, normalized or keyValues.
 
     Args:
         body: JSON.
-        is_past: Tells by its identity what need not be read; None reads all.
-        instead: Other readers of some attributes, such as ``UNREAD``.
+        is_past: As of :func:`read_attributes`.
         equipment: Id and type of entities whose attributes are handed on as they are.
 
     Returns:
@@ -153,12 +477,10 @@ def read_notification(
         UnreadableError: not a notification at all.
     """
     try:
-        notification = payloads.NotificationValue.model_validate(load_json(body))
+        notification = _Notification.model_validate(load_json(body))
     except ValidationError as error:
         raise UnreadableError("not_a_notification", first_complaint(error)) from error
-    entities = [
-        read_entity(entity, is_past, instead, equipment) for entity in notification.data
-    ]
+    entities = [read_entity(entity, is_past, equipment) for entity in notification.data]
     read = entities[0] if len(entities) == 1 else merge(entities)
     return notification.subscriptionId, read
 
@@ -166,7 +488,6 @@ def read_notification(
 def read_entity(
     entity: Mapping[str, object],
     is_past: IsPast | None = None,
-    instead: Readers = NO_OTHERS,
     equipment: Container[tuple[str, str]] = frozenset(),
 ) -> ReadResult:
     """Read one NGSI-v2 entity in either representation."""
@@ -178,21 +499,18 @@ def read_entity(
         for name, value in entity.items()
         if name not in ("id", "type")
     }
+    identity = entity_id, entity_type
     if entity_type == names.ROBOT_TYPE:
         if not names.is_robot_id(entity_id):
-            return unread(payloads.clean_text(entity_id), "bad_robot_id")
-        return read_attributes(entity_id, attributes, is_past, instead)
-    if (entity_id, entity_type) == (names.CLIMATE_ID, names.CLIMATE_TYPE):
-        return read_one(entity_id, climate, attributes)
-    if (entity_id, entity_type) == (names.HEARTBEAT_ID, names.HEARTBEAT_TYPE):
-        return read_one(entity_id, heartbeat, attributes)
-    if (entity_id, entity_type) in equipment:
+            return unread(clean_text(entity_id), "bad_robot_id")
+        return read_attributes(entity_id, attributes, is_past)
+    if identity == (names.CLIMATE_ID, names.CLIMATE_TYPE):
+        return _read(entity_id, _read_climate, attributes, "entity")
+    if identity == (names.HEARTBEAT_ID, names.HEARTBEAT_TYPE):
+        return _read(entity_id, _read_heartbeat, attributes, "entity")
+    if identity in equipment:
         return ReadResult(equipment=(EntityReading(entity_id, attributes),))
-    return unread(
-        payloads.clean_text(entity_id),
-        "foreign_entity",
-        payloads.clean_text(entity_type),
-    )
+    return unread(clean_text(entity_id), "foreign_entity", clean_text(entity_type))
 
 
 def _attribute_value(attribute: object) -> object:
@@ -201,99 +519,10 @@ def _attribute_value(attribute: object) -> object:
     return attribute
 
 
-def write_stop(hold_id: str, by: str) -> dict[str, object]:
-    """The value of ``cmd`` that stops a robot."""
-    return {"stop": {"id": hold_id, "by": by}}
+def _read_climate(_: str, attributes: Mapping[str, object]) -> Climate:
+    return adapter(Climate).validate_python(dict(attributes))
 
 
-def write_release(
-    hold_ids: Iterable[str], challenge: str, attempt: str
-) -> dict[str, object]:
-    """The value of ``cmd`` that lifts exactly these holds.
-
-    Args:
-        hold_ids: Every remote hold of the robot.
-        challenge: The robot's newest.
-        attempt: Names this order, so that its copies are known for what they are.
-    """
-    return {"release": {"ids": list(hold_ids), "ch": challenge, "attempt": attempt}}
-
-
-def write_resume(challenge: str, attempt: str) -> dict[str, object]:
-    """The value of ``cmd`` that lets a released robot drive; as ``write_release``."""
-    return {"resume": {"ch": challenge, "attempt": attempt}}
-
-
-def write_goal(order: GoalOrder | CancelOrder) -> dict[str, object]:
-    """The value of ``goal`` that gives a goal, or takes it back."""
-    if isinstance(order, CancelOrder):
-        return {"cancel": {"id": order.goal_id}}
-    goal = order.goal
-    fields = {"id": goal.goal_id, "kind": goal.kind, "x": goal.x, "y": goal.y}
-    return {"set": {**fields, "ch": order.challenge, "until": order.until_s}}
-
-
-def write_command(value: Mapping[str, object], name: str = names.COMMAND) -> bytes:
-    """A command as the IoT Agent puts it on the robot's topic."""
-    return orjson.dumps({name: value})
-
-
-def write_desired(desired: Literal["stopped", "run"], ids: Iterable[str]) -> bytes:
-    """The retained desired state on ``/{robot}/iveg/desired``."""
-    return orjson.dumps({"desired": desired, "ids": list(ids)})
-
-
-LARGEST = 1024
-"""Size of a message at most (bytes)."""
-
-
-def write_peer_scan(scan: PeerScan) -> bytes:
-    """The bytes of ``/{robot}/iveg/peer_scan``."""
-    centimetres = scan.ranges.astype(np.float64).round(2).tolist()
-    return orjson.dumps(
-        {
-            "boot": scan.origin.boot,
-            "seq": scan.origin.seq,
-            "stamp": scan.origin.stamp,
-            "robot_id": scan.robot_id,
-            "robot_pose": {**_pose(scan.pose), "frame_id": "map"},
-            "age_s": round(scan.age_s, 3),
-            "mount": _pose(scan.mount),
-            "range_max": round(scan.range_max, 3),
-            "ranges": [None if one == np.inf else one for one in centimetres],
-            "places": scan.places.tolist(),
-        }
-    )
-
-
-def _pose(pose: Pose2D) -> dict[str, float | None]:
-    return {"x": rounded(pose.x), "y": rounded(pose.y), "yaw": rounded(pose.yaw)}
-
-
-def read_peer_scan(robot_id: str, payload: bytes) -> PeerScan:
-    """Read ``/{robot}/iveg/peer_scan``.
-
-    Raises:
-        UnreadableError: ``too_large``, ``not_json``, ``not_a_peer_scan``, or
-            ``another_robot`` than ``robot_id``.
-    """
-    if len(payload) > LARGEST:
-        raise UnreadableError("too_large", f"{len(payload)} bytes")
-    try:
-        value = payloads.PeerScanValue.model_validate(load_json(payload))
-    except ValidationError as error:
-        raise UnreadableError("not_a_peer_scan", first_complaint(error)) from error
-    if value.robot_id != robot_id:
-        raise UnreadableError("another_robot", value.robot_id)
-    pose, mount = value.robot_pose, value.mount
-    ranges = np.array([np.inf if r is None else r for r in value.ranges], np.float32)
-    return PeerScan(
-        robot_id,
-        read_origin(value),
-        Pose2D(pose.x, pose.y, pose.yaw),
-        value.age_s,
-        Pose2D(mount.x, mount.y, mount.yaw),
-        value.range_max,
-        ranges,
-        np.array(value.places, np.uint8),
-    )
+def _read_heartbeat(_: str, attributes: Mapping[str, object]) -> HeartbeatProbe:
+    """The probe that iVeg sends through the whole chain."""
+    return HeartbeatProbe(read_origin(attributes["probe"]))

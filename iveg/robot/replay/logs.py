@@ -23,10 +23,7 @@ from iveg.domain.observations import (
     Origin,
     UnreadScan,
 )
-from iveg.ngsi import codec
-from iveg.ngsi.codec import load_json
-from iveg.ngsi.codec.attributes import ranges_of
-from iveg.ngsi.payloads import (
+from iveg.domain.wire import (
     FORBIDDEN,
     LidarPoints,
     Metres,
@@ -35,6 +32,9 @@ from iveg.ngsi.payloads import (
     Text,
     Wire,
 )
+from iveg.ngsi import codec
+from iveg.ngsi.codec import load_json
+from iveg.ngsi.codec.incoming import ranges_of
 
 # --- logs -------------------------------------------------------------------------
 #

@@ -22,7 +22,7 @@ from iveg.domain.observations import (
     Navigation,
     RobotFault,
 )
-from iveg.ngsi.payloads import FORBIDDEN, MAX_BEAMS, MAX_PATH, clean_text
+from iveg.domain.wire import FORBIDDEN, MAX_BEAMS, MAX_PATH, clean_text
 from iveg.robot.ros2.transforms import RigidTransform, rigid_of
 from iveg.ros2 import messages as ros
 

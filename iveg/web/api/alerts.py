@@ -17,9 +17,9 @@ from iveg.adapters.history.queries import Queries
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import Instant
+from iveg.domain.wire import clean_text, legible
 from iveg.models.base import Listing
 from iveg.models.history import AcknowledgedAlerts, Alert, Note
-from iveg.ngsi.payloads import clean_text, legible
 from iveg.vital.evaluate import Evaluator
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json

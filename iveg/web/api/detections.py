@@ -16,11 +16,11 @@ from pydantic import AfterValidator, Field, model_validator
 
 from iveg.adapters.history.lists import USUAL_ROWS
 from iveg.domain.records import DetectionRecord
+from iveg.domain.wire import legible
 from iveg.domain.words import WordAnswer
 from iveg.models.base import Body, Listing, write_json
 from iveg.models.people import DetectionRow, Thing
 from iveg.models.robot import Detector
-from iveg.ngsi.payloads import legible
 from iveg.vital.detectors import Detectors
 from iveg.vital.newest_detections import NewestDetections
 from iveg.vital.ports import Clock

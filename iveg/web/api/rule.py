@@ -9,11 +9,11 @@ from iveg.comfort.trials import Trials
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import VersionMissingError
 from iveg.domain.parameters import PARAMETERS, Class
+from iveg.domain.wire import clean_text
 from iveg.models.base import Body, Listing
 from iveg.models.rule import Rule as RuleModel
 from iveg.models.rule import Trial as TrialModel
 from iveg.models.rule import parameter_fields
-from iveg.ngsi.payloads import clean_text
 from iveg.vital.ports import Clock
 from iveg.vital.rules import Rules
 from iveg.web.api.answers import Json

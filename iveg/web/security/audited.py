@@ -17,8 +17,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.parameters import Parameters, by_keys
+from iveg.domain.wire import all_legible, clean_text
 from iveg.ngsi.codec import load_json
-from iveg.ngsi.payloads import all_legible, clean_text
 from iveg.vital.audit import AuditTrail
 from iveg.vital.ports import Clock
 from iveg.web.security.roles import Principal

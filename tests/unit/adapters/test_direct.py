@@ -9,16 +9,19 @@ from iveg.domain.observations import (
     CommandAnswer,
     DetectionFrame,
     LaserScan,
+    Observation,
     Odometry,
     Received,
     SafetyReport,
     kind_of,
 )
+from iveg.domain.world import World
 from iveg.ngsi import codec
 from iveg.vital.ingest import Ingest
 from tests.builders import (
     detection,
     detection_frame,
+    ignore,
     odometry,
     safety_report,
     scan,
@@ -27,19 +30,32 @@ from tests.fakes.clock import FakeClock
 
 
 class Bench:
+    """A reader, and all that it offers and rejects."""
+
     def __init__(self, scope: Scope = "all") -> None:
         self.offered: list[Received] = []
         self.rejected: list[tuple[str, str, str]] = []
         self.clock = FakeClock()
+        self.ingest = Ingest(World(("AGI",)), ignore, ignore)
         self.reader = DirectReader(
             "iveg",
             ["AGI"],
             self.clock,
-            self.offered.append,
-            lambda *problem: self.rejected.append(problem),
+            self,
             scope,
-            is_early=Ingest({"AGI"}.__contains__).is_early,
         )
+
+    def is_past(self, *_: object) -> bool:
+        return False
+
+    def is_early(self, robot_id: str, kind: type[Observation], now: float) -> bool:
+        return self.ingest.is_early(robot_id, kind, now)
+
+    def enqueue(self, received: Received) -> None:
+        self.offered.append(received)
+
+    def reject(self, source: str, reason: str, detail: str = "") -> None:
+        self.rejected.append((source, reason, detail))
 
 
 def test_looks_reports_and_answers_come_in_on_the_direct_transport() -> None:
@@ -48,9 +64,9 @@ def test_looks_reports_and_answers_come_in_on_the_direct_transport() -> None:
     answer = b'{"cmd": {"id": "01A", "r": "LATCHED", "holds": []}}'
 
     bench.reader.read(
-        "/iveg/AGI_yolox_bounding_boxes/attrs", codec.write_detections(frame)
+        "/iveg/AGI_yolox_bounding_boxes/attrs", codec.write_measure(frame)
     )
-    bench.reader.read("/iveg/AGI_safety/attrs", codec.write_safety(safety_report()))
+    bench.reader.read("/iveg/AGI_safety/attrs", codec.write_measure(safety_report()))
     bench.reader.read("/iveg/AGI/cmdexe", answer)
 
     kinds = [type(one.observation) for one in bench.offered]
@@ -62,7 +78,7 @@ def test_looks_reports_and_answers_come_in_on_the_direct_transport() -> None:
 def test_poses_come_straight_from_either_topic(topic: str) -> None:
     bench = Bench()
 
-    bench.reader.read(topic, codec.write_odometry(odometry()))
+    bench.reader.read(topic, codec.write_measure(odometry()))
 
     (read,) = bench.offered
     assert (type(read.observation), read.transport) == (Odometry, "direct")
@@ -73,8 +89,8 @@ def test_of_scans_at_30_hz_every_second_is_read() -> None:
 
     for turn in range(30):
         bench.clock.now = turn / 30
-        bench.reader.read("/AGI/iveg/lidar2D", codec.write_scan(scan()))
-        bench.reader.read("/AGI/iveg/odom", codec.write_odometry(odometry()))
+        bench.reader.read("/AGI/iveg/lidar2D", codec.write_measure(scan()))
+        bench.reader.read("/AGI/iveg/odom", codec.write_measure(odometry()))
 
     read = [kind_of(one.observation) for one in bench.offered]
     assert (read.count(LaserScan), read.count(Odometry)) == (15, 30)
@@ -86,7 +102,7 @@ def test_of_scans_at_30_hz_every_second_is_read() -> None:
 def test_a_report_says_how_many_its_topic_has(topic: str, sparse: bool) -> None:
     bench = Bench("safety")
 
-    bench.reader.read(topic, codec.write_safety(safety_report()))
+    bench.reader.read(topic, codec.write_measure(safety_report()))
 
     assert [one.sparse for one in bench.offered] == [sparse]
 
@@ -94,8 +110,8 @@ def test_a_report_says_how_many_its_topic_has(topic: str, sparse: bool) -> None:
 def test_a_scope_of_safety_leaves_poses_and_scans_to_orion() -> None:
     bench = Bench("safety")
 
-    bench.reader.read("/iveg/AGI/attrs", codec.write_odometry(odometry()))
-    bench.reader.read("/iveg/AGI/attrs", codec.write_scan(scan()))
+    bench.reader.read("/iveg/AGI/attrs", codec.write_measure(odometry()))
+    bench.reader.read("/iveg/AGI/attrs", codec.write_measure(scan()))
 
     assert bench.offered == []
 
@@ -105,7 +121,7 @@ def test_f30_an_apostrophe_that_orion_refuses_costs_nobody_their_ring() -> None:
     frame = detection_frame("AGI", detection("farmer's wife", 1.0))
 
     bench.reader.read(
-        "/iveg/AGI_yolox_bounding_boxes/attrs", codec.write_detections(frame)
+        "/iveg/AGI_yolox_bounding_boxes/attrs", codec.write_measure(frame)
     )
 
     assert len(bench.offered) == 1
@@ -126,7 +142,7 @@ def test_what_the_broker_had_retained_is_no_news_and_counted_by_name() -> None:
     bench = Bench()
 
     for topic in ("/iveg/AGI_odom/attrs", "/iveg/AGI/cmdexe", "/other/topic"):
-        bench.reader.refuse_stored(topic, codec.write_odometry(odometry()))
+        bench.reader.refuse_stored(topic, codec.write_measure(odometry()))
 
     assert bench.offered == []
     assert bench.rejected == [

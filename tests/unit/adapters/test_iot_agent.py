@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import aiomqtt
 import pytest
 
-from iveg.adapters.fleet_provisioning import Provisioned, provision
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
+from iveg.adapters.reconciler import Reconciled, provision
 from iveg.lab.embedded.context_broker import Registration
 from iveg.lab.embedded.entities import new_id
 from iveg.lab.embedded.server import Running, embedded_fiware
@@ -25,7 +25,7 @@ class Site:
     agent: IotAgentClient
     orion: OrionClient
 
-    async def provision(self, *robots: str) -> Provisioned:
+    async def provision(self, *robots: str) -> Reconciled:
         return await provision(
             self.agent, self.orion, robots, "iveg", self.up.orion_url
         )

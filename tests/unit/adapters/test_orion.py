@@ -4,13 +4,12 @@ from collections.abc import AsyncIterator
 import pytest
 
 from iveg.adapters import fiware_http
-from iveg.adapters.fleet_provisioning import provision
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
+from iveg.adapters.reconciler import provision
 from iveg.domain.errors import HopError
 from iveg.lab.embedded.server import Running
 from tests.faulty_fiware import faulty_fiware
-from tests.http_servers import Request, Response, http_server
 
 TENANT = ("agroconnect", "/greenhouse")
 ODOMETRY = {"type": "object", "value": {"x": 1.0, "y": 2.0, "yaw": 0.1}}
@@ -94,15 +93,3 @@ async def test_an_orion_that_is_away_is_a_hop_error() -> None:
     async with OrionClient("http://127.0.0.1:1", *TENANT) as client:
         with pytest.raises(HopError, match=r"^orion: cannot be reached"):
             await client.read_robots()
-
-
-async def test_an_answer_that_is_not_json_is_a_hop_error() -> None:
-    async def handle(_: Request) -> Response:
-        return Response(200, b"<html>", content_type="text/html")
-
-    async with (
-        http_server(handle, "127.0.0.1", 0) as port,
-        OrionClient(f"http://127.0.0.1:{port}", *TENANT) as client,
-    ):
-        with pytest.raises(HopError, match="not JSON"):
-            await client.version()

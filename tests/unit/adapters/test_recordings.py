@@ -127,17 +127,17 @@ async def test_what_came_in_is_there_byte_for_byte_with_its_time(site: Site) -> 
 
 
 async def test_viewers_draw_poses_scans_and_boxes_thinned(site: Site) -> None:
-    looked = codec.write_detections(detection_frame("AGI", detection(x=3.0)))
+    looked = codec.write_measure(detection_frame("AGI", detection(x=3.0)))
     for n in range(30):
         pose = pose_value(x=n, seq=n)
         body = notification({"base_pose_ground_truth": pose})
-        site.hear(n / 30, codec.write_odometry(odometry(x=n, origin=origin(n))))
+        site.hear(n / 30, codec.write_measure(odometry(x=n, origin=origin(n))))
         # The copy by FIWARE is no second picture, and a stranger none at all.
         site.recorder.notification(body, at(n / 30), [odometry()])
         strange = notification({"base_pose_ground_truth": pose}, robot_id="B1")
         site.recorder.notification(strange, at(n / 30), [odometry("B1")])
         site.hear(n / 30, looked, "/iveg/AGI_yolox_bounding_boxes/attrs")
-        site.hear(n / 30, codec.write_scan(scan()), SCAN)
+        site.hear(n / 30, codec.write_measure(scan()), SCAN)
     site.hear(0.99, b'{"no": "scan"}', SCAN)
     site.write(1.0)
     site.close()
@@ -160,7 +160,7 @@ async def test_of_a_scan_that_its_twin_has_overtaken_no_numbers_are_kept(
     site: Site,
 ) -> None:
     swept = scan(ranges=[2.5] * 360, angle_increment=0.01)
-    value = codec.write_scan(swept)
+    value = codec.write_measure(swept)
     body = notification(orjson.loads(value))
     twin = Overtaken("AGI", origin(), LaserScan)
     site.hear(0.0, value, SCAN)

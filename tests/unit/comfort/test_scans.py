@@ -12,12 +12,12 @@ from tests.unit.vital.desk import Desk
 
 def measure(**changes: Any) -> bytes:
     """A scan on the wire, with other values where they are given."""
-    return orjson.dumps({**orjson.loads(codec.write_scan(scan())), **changes})
+    return orjson.dumps({**orjson.loads(codec.write_measure(scan())), **changes})
 
 
 def hear(desk: Desk, payload: bytes) -> list[str]:
     """A scan of AGI as it comes from MQTT; reasons of what is refused at once."""
-    reading = codec.read_measure("AGI_lidar2D", payload, instead=codec.UNREAD)
+    reading = codec.read_measure("AGI_lidar2D", payload, lambda *_: False)
     received = [Received(one, desk.clock()) for one in reading.observations]
     desk.loop.step(received, desk.clock())
     return [one.reason for one in reading.problems]

@@ -3,7 +3,7 @@
 import pytest
 
 from iveg.domain.accounts import is_name
-from iveg.ngsi.payloads import FORBIDDEN
+from iveg.domain.wire import FORBIDDEN
 
 
 @pytest.mark.parametrize(

@@ -2,14 +2,13 @@
 
 import json
 import re
-from dataclasses import Field, FrozenInstanceError, fields
+from dataclasses import Field, fields
 from typing import Any
 
-import numpy as np
 import pytest
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.limits import LIMITS, grown_radius
+from iveg.domain.limits import LIMITS
 from iveg.domain.parameters import ByClass
 from iveg.robot.judgement import Limits
 from iveg.settings import Settings
@@ -26,19 +25,6 @@ def test_the_ring_law_gives_the_shared_cases(case: dict[str, float]) -> None:
     assert rule.radius_at(case["age_s"], "person") == pytest.approx(
         case["ring_m"], abs=1e-6
     )
-
-
-def test_the_ring_law_judges_an_array_as_it_judges_each_age() -> None:
-    ages = np.linspace(0.0, 12.0, 500)
-
-    rings = grown_radius(2.0, ages, np.minimum, np.maximum)
-
-    assert rings.tolist() == [grown_radius(2.0, age) for age in ages.tolist()]
-
-
-def test_nobody_can_change_a_limit() -> None:
-    with pytest.raises(FrozenInstanceError):
-        LIMITS.zone_default_m = 0.1  # type: ignore[misc]
 
 
 @pytest.mark.parametrize("row", fields(LIMITS), ids=lambda row: row.name)

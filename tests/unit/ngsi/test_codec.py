@@ -1,23 +1,20 @@
 """What the contract says is read; what iVeg writes is as the contract says."""
 
 import math
-from dataclasses import replace
 
 import orjson
 import pytest
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.feedback import CLEAR, Feedback, FeedbackAlert, SpeedLimit
+from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import (
     CommandAnswer,
     CommandStatus,
     DetectionFrame,
     LaserScan,
-    Navigation,
     Odometry,
     Origin,
-    ReportedObstacle,
 )
 from iveg.domain.parameters import ByClass, sent_to_robots
 from iveg.ngsi import codec, names
@@ -83,12 +80,6 @@ def test_a_single_box_and_a_list_of_boxes_are_both_accepted() -> None:
     assert (len(one.detections), len(many.detections)) == (1, 2)
 
 
-def test_an_empty_list_says_looked_and_saw_nothing() -> None:
-    (frame,) = entity(bounding_boxes=[], detection_header={"boot": "b", "seq": 4})
-
-    assert frame == DetectionFrame("AGI", Origin("b", 4), ())
-
-
 def test_the_agents_opinion_and_the_robots_answer_are_told_apart() -> None:
     status, answer = entity(
         cmd_status="OK", cmd_info={"id": "01A", "r": "LATCHED", "boot": "b", "seq": 1}
@@ -135,32 +126,7 @@ def test_algorithm_1s_single_payload_is_accepted() -> None:
     assert (seen.frame_id, seen.probability) == ("map", 0.91)
 
 
-def test_a_detection_of_algorithm_1_without_confidence_is_counted() -> None:
-    (frame,) = entity(**{"class": "farmer", "position_3D": {"x": 1, "y": 2, "z": 0}})
-
-    assert isinstance(frame, DetectionFrame)
-    assert len(frame.unread) == 1
-
-
 # --- scans ------------------------------------------------------------------------
-
-
-def test_a_header_says_where_the_laser_sits_and_looks() -> None:
-    header = {
-        "angle_min": -1.0,
-        "angle_increment": 0.5,
-        "range_min": 0.1,
-        "range_max": 20.0,
-        "x": 0.3,
-        "y": -0.1,
-        "yaw": 0.2,
-        "seq": 8,
-    }
-    (sweep,) = entity(lidar_points=[1.0], lidar_header=header)
-
-    assert isinstance(sweep, LaserScan)
-    assert sweep.mount == Pose2D(0.3, -0.1, 0.2)
-    assert (sweep.angle_min, sweep.range_max, sweep.origin.seq) == (-1.0, 20.0, 8)
 
 
 # --- stamps -----------------------------------------------------------------------
@@ -170,11 +136,9 @@ def test_a_header_says_where_the_laser_sits_and_looks() -> None:
     ("text", "seconds"),
     [
         ("2023-11-14T22:13:20.000Z", START.wall),
-        ("2023-11-14T22:13:20+00:00", START.wall),
         ("2023-11-15T00:13:20+02:00", START.wall),
         ("2023-11-14T22:13:20", START.wall),
         ("garbage", None),
-        ("", None),
         ("1700000000", None),
     ],
 )
@@ -212,7 +176,7 @@ def test_feedback_is_written_as_the_contract_says() -> None:
         Pose2D(1.0, 2.0, 0.1),
         Twist2D(0.5, 0.0),
         "t",
-        {"AGI": SpeedLimit(), "AGII": SpeedLimit(0.5, "person", None, 1.43, "d-1")},
+        {"AGI": SpeedLimit(1.0), "AGII": SpeedLimit(0.5, "person", None, 1.43, "d-1")},
         {"AGII": 8731},
     )
 
@@ -274,39 +238,6 @@ def test_a_speed_limit_is_read_and_goes_before_a_clear_of_the_same_robot(
     assert feedback.speed_limits == {"AGI": SpeedLimit(0.5, "person")}
 
 
-def test_who_is_named_clear_is_clear_and_who_is_not_named_is_not_there() -> None:
-    feedback = codec.read_feedback(
-        orjson.dumps({"robot_id": "AGI", "speed_limits": {}, "clear": ["AGI"]})
-    )
-
-    assert feedback.speed_limits == {"AGI": CLEAR}
-
-
-def test_feedback_tells_how_people_go_on_where_the_rule_looks_ahead() -> None:
-    alert = FeedbackAlert("d", "s", "person", position=(1.0, 2.0, 0.0))
-    goes = replace(alert, velocity=(0.5, -1.0))
-    told = Feedback("AGI", Origin(), alerts=(goes, alert), foresight=True)
-    payload = codec.write_feedback(told)
-
-    assert orjson.loads(payload)["alerts"][0]["velocity"] == {"x": 0.5, "y": -1.0}
-    assert codec.read_feedback(payload).alerts == told.alerts
-    assert codec.read_feedback(payload).foresight
-    assert "foresight" not in orjson.loads(
-        codec.write_feedback(Feedback("AGI", Origin()))
-    )
-
-
-def test_a_limit_says_that_it_is_over_and_else_nothing_of_it() -> None:
-    limits = {
-        "AGI": SpeedLimit(0.5, "person", over=True),
-        "AGII": SpeedLimit(0.5, "robot"),
-    }
-    payload = codec.write_feedback(Feedback("AGI", Origin(), speed_limits=limits))
-
-    assert codec.read_feedback(payload).speed_limits == limits
-    assert "over" not in orjson.loads(payload)["speed_limits"]["AGII"]
-
-
 @pytest.mark.parametrize(("lag", "told"), [(0.04, 0.0), (12.34, 12.3), (500.0, 60.0)])
 def test_a_backlog_is_told_in_seconds_up_to_a_minute(lag: float, told: float) -> None:
     payload = codec.write_feedback(Feedback("AGI", Origin(), backlog_s=lag))
@@ -322,10 +253,7 @@ def test_a_backlog_is_told_in_seconds_up_to_a_minute(lag: float, told: float) ->
         ({"fiware_s": 1e9}, 60.0),
         ({"fiware_s": -1}, None),
         ({"fiware_s": True}, None),
-        ({"fiware_s": "7"}, None),
         ({}, None),
-        (7, None),
-        (None, None),
     ],
 )
 def test_a_backlog_that_cannot_be_read_costs_no_speed_limit(
@@ -346,19 +274,9 @@ def test_a_backlog_that_cannot_be_read_costs_no_speed_limit(
 
 
 def test_every_measure_carries_its_stamp_at_the_top_level_too() -> None:
-    written = orjson.loads(codec.write_odometry(odometry(origin=origin())))
+    written = orjson.loads(codec.write_measure(odometry(origin=origin())))
 
     assert written["TimeInstant"] == codec.format_stamp(at(0).wall)
-
-
-@pytest.mark.parametrize("moved", [True, False])
-def test_what_a_laser_sees_is_told_in_the_report_and_read_the_same(moved: bool) -> None:
-    seen = ReportedObstacle(3.25, -1.5, 0.45, moved)
-    said = replace(safety_report(), obstacle=seen)
-    (read,) = codec.read_measure("AGI_safety", codec.write_safety(said)).observations
-
-    assert read == said
-    assert b"obstacle" not in codec.write_safety(safety_report())
 
 
 @pytest.mark.parametrize(
@@ -366,14 +284,12 @@ def test_what_a_laser_sees_is_told_in_the_report_and_read_the_same(moved: bool) 
     [
         {"x": 1e9, "y": 0.0, "width_m": 0.4, "moved": True},
         {"x": 0.0, "y": 0.0, "width_m": -0.1, "moved": True},
-        {"x": 0.0, "y": 0.0, "width_m": 0.4, "moved": "yes"},
         {"x": 0.0, "y": 0.0, "moved": True},
-        [0.0, 0.0],
         "somebody",
     ],
 )
 def test_an_obstacle_that_cannot_be_read_costs_no_report(obstacle: object) -> None:
-    said = orjson.loads(codec.write_safety(safety_report()))
+    said = orjson.loads(codec.write_measure(safety_report()))
     said["safety_state"]["obstacle"] = obstacle
     reading = codec.read_measure("AGI_safety", orjson.dumps(said))
 
@@ -384,35 +300,11 @@ def test_an_obstacle_that_cannot_be_read_costs_no_report(obstacle: object) -> No
 # --- names ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("device", "robot"),
-    [
-        ("AGI", "AGI"),
-        ("AGI_odom", "AGI"),
-        ("AGII_lidar2D", "AGII"),
-        ("AGI_yolox_bounding_boxes", "AGI"),
-        ("AGI_safety", "AGI"),
-        ("AGI_nav", "AGI"),
-    ],
-)
-def test_a_device_belongs_to_its_robot(device: str, robot: str) -> None:
-    assert names.robot_of_device(device) == robot
-
-
-def test_no_attribute_name_holds_what_orion_forbids() -> None:
+def test_devices_are_their_robots_and_no_attribute_holds_what_orion_forbids() -> None:
     for device in names.ROBOT_DEVICES:
+        assert names.robot_of_device("AGI" + device.suffix) == "AGI"
         for name, _ in device.attributes:
             assert not set(name) & set("<>\"'=;()")
-
-
-def test_navigation_is_read_with_goal_and_path() -> None:
-    path = [[0, 0], [1, 2]]
-    value = {"task": "harvest", "goal": {"x": 1, "y": 2}, "path": path}
-    (intent,) = entity(navigation=value)
-
-    assert intent == Navigation(
-        "AGI", Origin(), "harvest", (1.0, 2.0), ((0.0, 0.0), (1.0, 2.0))
-    )
 
 
 def test_what_robots_are_told_alike_is_written_once_and_reads_the_same() -> None:
@@ -434,8 +326,8 @@ def test_a_scan_in_no_frame_of_its_robot_is_refused_by_name(frame: str) -> None:
     body = b'{"lidar_points": [1.0], "lidar_header": {"angle_min": 0, '
     body += b'"angle_increment": 0.1, "range_max": 9, "frame_id": "%b"}}'
 
-    for instead in ({}, codec.UNREAD):
-        read = codec.read_measure("AGI_lidar2D", body % frame.encode(), instead=instead)
+    for is_past in (None, lambda *_: False):
+        read = codec.read_measure("AGI_lidar2D", body % frame.encode(), is_past=is_past)
 
         assert read.observations == ()
         assert [one.reason for one in read.problems] == ["unknown_frame"]

@@ -8,13 +8,12 @@ import pytest
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import (
     DetectionFrame,
-    LaserScan,
     Navigation,
     Odometry,
     RefusedFrame,
     SafetyReport,
 )
-from iveg.ngsi import codec, payloads
+from iveg.ngsi import codec
 from tests.builders import notification, pose_value
 
 BOX = {
@@ -58,22 +57,6 @@ def test_f27_what_is_no_number_in_range_is_not_made_one(text: str) -> None:
     assert reading.problems[0].reason == "bad_base_pose_ground_truth"
 
 
-@pytest.mark.parametrize("probability", [1.2, -0.1, True, "0.9", None, 10**400])
-def test_a_probability_that_is_none_makes_the_box_unreadable(
-    probability: object,
-) -> None:
-    body = {**BOX, "probability": "here"}
-    text = orjson.dumps({"bounding_boxes": [BOX, body]})
-    text = text.replace(b'"here"', repr(probability).encode().replace(b"'", b'"'))
-    text = text.replace(b"True", b"true").replace(b"None", b"null")
-
-    reading = codec.read_measure("AGI_yolox_bounding_boxes", text)
-
-    frames = [one for one in reading.observations if isinstance(one, DetectionFrame)]
-    assert [(len(one.detections), len(one.unread)) for one in frames] in ([(1, 1)], [])
-    assert frames or reading.problems
-
-
 def test_a_box_without_probability_or_position_is_counted_not_guessed() -> None:
     frame = boxes(
         BOX,
@@ -96,17 +79,10 @@ def test_a_box_that_names_no_frame_is_read_without_one(named: str) -> None:
     assert [one.frame_id for one in frame.detections] == [None]
 
 
-@pytest.mark.parametrize("frame_id", ["unplaced", 7, ["map"]])
-def test_a_box_without_a_place_is_unreadable(frame_id: object) -> None:
-    assert boxes({**BOX, "frame_id": frame_id}).unread == ("farmer",)
-
-
 @pytest.mark.parametrize(
     "proof",
     [
         {"mono": -1.0},
-        {"mono": "soon"},
-        {"heard": 7},
         {"heard": {"boot": "b"}},
         {"heard": {"boot": "b", "seq": -1}},
         {"heard": {"boot": None, "seq": 1}},
@@ -153,14 +129,6 @@ def test_f26_five_megabytes_of_points_are_refused() -> None:
     assert reading.problems[0].reason == "bad_lidar_points"
 
 
-def test_more_boxes_than_anybody_sees_are_refused() -> None:
-    payload = orjson.dumps({"bounding_boxes": [BOX] * (payloads.MAX_BOXES + 1)})
-
-    reading = codec.read_measure("AGI_yolox_bounding_boxes", payload)
-
-    assert reading.problems[0].reason == "bad_bounding_boxes"
-
-
 # --- text (F29, F32) --------------------------------------------------------------
 
 
@@ -170,12 +138,9 @@ def test_more_boxes_than_anybody_sees_are_refused() -> None:
         ("farmer", "farmer"),
         ("far\u0000mer", "farmer"),
         ("\u202efarmer\u2066", "farmer"),
-        ("far\u200bmer\u200f", "farmer"),
         ("a\nb\r\tc", "abc"),
         ("e\u0301", "\u00e9"),
-        ("<script>", "<script>"),
         ("x" * 10_000, "x" * 64),
-        ("", ""),
     ],
 )
 def test_f29_text_is_cleaned_and_cut(sent: str, kept: str) -> None:
@@ -243,13 +208,9 @@ def test_one_bad_entity_does_not_hurt_its_neighbours() -> None:
 @pytest.mark.parametrize(
     "body",
     [
-        b"",
-        b"null",
         b"[]",
-        b"{}",
         b'{"subscriptionId": 1, "data": []}',
         b'{"subscriptionId": "s"}',
-        b'{"subscriptionId": "s", "data": {}}',
         b'{"subscriptionId": "s", "data": [1]}',
         b"\xff\xfe",
         b'{"subscriptionId": "s", "data": []}trailing',
@@ -293,14 +254,6 @@ def test_a_safety_report_that_is_wrong_in_one_place_is_no_report(
 
     assert not [one for one in reading.observations if isinstance(one, SafetyReport)]
     assert reading.problems[0].reason == "bad_safety_state"
-
-
-def test_a_scan_with_a_bad_header_is_refused_whole() -> None:
-    payload = orjson.dumps({"lidar_points": [1.0], "lidar_header": {"angle_min": 0}})
-
-    reading = codec.read_measure("AGI_lidar2D", payload)
-
-    assert not [one for one in reading.observations if isinstance(one, LaserScan)]
 
 
 @pytest.mark.parametrize("speed", [100.1, -100.1])
@@ -386,7 +339,8 @@ def test_bytes_of_a_detector_that_are_no_measure_are_a_refused_frame(
 
 def test_a_bad_box_keeps_the_good_ones_and_tells_its_class() -> None:
     unsure: dict[str, object] = {**BOX, "probability": 95}
-    boxes = [BOX, unsure, {**unsure, "class_id": "tomato"}, {**unsure, "class_id": 7}]
+    unplaced = {**BOX, "class_id": "tomato", "frame_id": "unplaced"}
+    boxes = [BOX, unsure, unplaced, {**unsure, "class_id": 7}]
 
     (frame,) = codec.read_attributes("AGI", {"bounding_boxes": boxes}).observations
 
@@ -403,10 +357,8 @@ def test_a_bad_box_keeps_the_good_ones_and_tells_its_class() -> None:
     [
         ({}, True),
         ({"angle_increment": 0.0}, False),
-        ({"angle_increment": 1e-8}, False),
         ({"angle_increment": -1e-300}, False),
         ({"angle_increment": 1e-4}, True),
-        ({"angle_increment": 1.0}, False),
         ({"angle_increment": -1.0}, False),
         ({"range_min": 9.0, "range_max": 9.0}, False),
         ({"range_min": -0.1}, False),

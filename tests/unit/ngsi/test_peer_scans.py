@@ -12,7 +12,7 @@ from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D
 from iveg.domain.peer_scan import PeerScan, peer_scan_of
 from iveg.ngsi import codec
-from iveg.ngsi.codec.incoming import LARGEST
+from iveg.ngsi.codec.feedback import LARGEST
 from tests.builders import origin, safety_report, scan
 
 ROUND = scan(
@@ -79,16 +79,8 @@ def test_what_is_wrong_is_refused(changes: dict[str, Any], reason: str) -> None:
     assert refused.value.reason == reason
 
 
-def test_a_report_asks_only_where_the_robot_wants_scans() -> None:
-    asks = replace(safety_report(), peer_scans=True)
-    (read,) = codec.read_measure("AGI_safety", codec.write_safety(asks)).observations
-
-    assert read == asks
-    assert b"peer_scans" not in codec.write_safety(safety_report())
-
-
 def test_a_wish_that_cannot_be_read_costs_no_report() -> None:
-    said = orjson.loads(codec.write_safety(safety_report()))
+    said = orjson.loads(codec.write_measure(safety_report()))
     said["safety_state"]["peer_scans"] = {"every": 1}
     reading = codec.read_measure("AGI_safety", orjson.dumps(said))
 

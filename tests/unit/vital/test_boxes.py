@@ -24,7 +24,7 @@ def sides(x: float, along: float, across: float, up: float) -> Detection:
 def send(desk: Desk, seen: Detection) -> None:
     """A frame of AGI, as it is sent and read."""
     look = detection_frame("AGI", seen, origin=desk.next_origin())
-    sent = codec.write_detections(look)
+    sent = codec.write_measure(look)
     (frame,) = codec.read_measure("AGI_yolox_bounding_boxes", sent).observations
     desk.hear(frame)
 

@@ -16,9 +16,11 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.domain.transports import DIRECT
+from iveg.domain.world import World
 from iveg.vital.ingest import MAX_QUEUED, Ingest
 from tests.builders import (
     detection_frame,
+    ignore,
     odometry,
     origin,
     received,
@@ -28,7 +30,7 @@ from tests.builders import (
 
 
 def ingest() -> Ingest:
-    return Ingest({"AGI", "AGII"}.__contains__)
+    return Ingest(World(("AGI", "AGII")), ignore, ignore)
 
 
 def test_what_arrives_leaves_in_the_same_order() -> None:
@@ -122,7 +124,7 @@ def test_an_unknown_robot_is_counted_each_time_and_logged_once(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     told: list[tuple[str, str]] = []
-    queue = Ingest({"AGI"}.__contains__, lambda *one: told.append(one))
+    queue = Ingest(World(("AGI",)), ignore, lambda *one: told.append(one))
     for _ in range(10):
         queue.enqueue(received(odometry("AGX")))
 
@@ -203,7 +205,7 @@ def test_what_orion_was_asked_for_hides_no_message() -> None:
 
 def test_the_twin_of_a_picture_is_timed_and_counted_and_waits_for_nobody() -> None:
     timed: list[Received] = []
-    queue = Ingest({"AGI"}.__contains__, passed=timed.append)
+    queue = Ingest(World(("AGI",)), timed.append, ignore)
     twin = received(Overtaken("AGI", origin(7), DetectionFrame))
 
     queue.enqueue(twin)
@@ -229,7 +231,7 @@ def test_a_copy_that_the_world_must_know_of_waits_for_it(copy: Overtaken) -> Non
 
 def test_nobody_who_is_rejected_often_hides_the_rejection_of_another() -> None:
     told: list[tuple[str, str]] = []
-    queue = Ingest({"AGI", "AGII"}.__contains__, lambda *one: told.append(one))
+    queue = Ingest(World(("AGI", "AGII")), ignore, lambda *one: told.append(one))
     for number in range(600):
         queue.reject(f"stranger-{number}", "bad_robot_id")
         queue.reject(f"AGI_{number}", "bad_robot_id")

@@ -82,7 +82,7 @@ def test_a_copy_is_news_only_where_its_row_orders_by_arrival(row: Kind) -> None:
 def test_a_battery_is_read_as_it_was_written() -> None:
     said = Battery("AGI", origin(3), 0.42, charging=True, voltage=25.1)
 
-    reading = codec.read_measure("AGI_battery", codec.write_sensed(said))
+    reading = codec.read_measure("AGI_battery", codec.write_measure(said))
 
     assert reading.observations == (said,)
 

@@ -21,8 +21,8 @@ from iveg.web.api import health
 from iveg.web.bounded_http import bounded_http
 from iveg.web.build import Face, build_app, live_routers
 from iveg.web.live import encoder
-from iveg.web.live.bounded import BoundedSocket
 from iveg.web.live.pictures import Past
+from iveg.web.live.socket import BoundedSocket
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.drawing import Pages
 from iveg.web.security.authentication import Authenticator
@@ -75,12 +75,14 @@ class WebDesk(Desk):
             self.ingest,
             NotifySecret(SECRET),
             self.clock,
-            "ours".__eq__,
+            self,
             ("agroconnect", "/greenhouse"),
-            self.heard.append,
-            self.parts.equipment.equipment.entities,
-            self.parts.supervision.guard("equipment", self.parts.equipment.receive),
-            is_former=self.former_secrets.__contains__,
+            notifications.Followers(
+                self.heard.append,
+                self.parts.equipment.equipment.entities,
+                self.parts.supervision.guard("equipment", self.parts.equipment.receive),
+                lambda *_: None,
+            ),
         )
         self.recordings = FakeRecordings()
         self.face = Face(
@@ -113,6 +115,16 @@ class WebDesk(Desk):
         return KeptChoices(
             self.rule_store, self.detector_store, self.word_store, self.trial_store
         )
+
+    # --- the subscriptions of iVeg --------------------------------------------------
+
+    def is_ours(self, subscription_id: str) -> bool:
+        """One alone is."""
+        return subscription_id == "ours"
+
+    def is_former(self, secret: str) -> bool:
+        """Those that a test names are."""
+        return secret in self.former_secrets
 
     # --- who asks -----------------------------------------------------------------
 

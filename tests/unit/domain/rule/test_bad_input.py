@@ -3,7 +3,6 @@
 Plans are in ``test_foresight``, lasers in ``test_obstacles`` and ``test_witness``.
 """
 
-import numpy as np
 import pytest
 
 from tests.unit.domain.scene import Scene, person
@@ -36,16 +35,3 @@ def test_a_robot_with_such_a_twist_is_slow_though_nobody_is_near(speed: float) -
         scene.look("AGII")
         limit = scene.judge()["AGI"]
     assert (limit.speed_factor, limit.reason) == (0.5, "doubt")
-
-
-def test_of_a_hundred_people_the_one_within_reach_slows_the_robot() -> None:
-    crowd = np.random.default_rng(5).uniform(8.0, 30.0, (99, 2)).tolist()
-    scene = Scene()
-    for there, factor in ((9.0, 1.0), (1.8, 0.5)):
-        scene.now += 0.2
-        scene.drive("AGI", 0.0, linear=0.0)
-        scene.drive("AGII", -50.0, linear=0.0)
-        scene.look("AGII")
-        scene.look("AGI", person(-there), *(person(x, y) for x, y in crowd))
-        assert scene.judge()["AGI"].speed_factor == factor
-    assert len(scene.everyone) >= 90

@@ -77,8 +77,7 @@ def played() -> Told:
 def by_fact(told: Told) -> dict[tuple[str, str, str | None], list[float]]:
     """The moments of each change of each robot for each cause."""
     moments: dict[tuple[str, str, str | None], list[float]] = {}
-    for at_s, *fact in told:
-        robot_id, change, cause = fact
+    for at_s, robot_id, change, cause in told:
         moments.setdefault((robot_id, change, cause), []).append(at_s)
     return moments
 

@@ -4,7 +4,7 @@ import pytest
 
 from iveg.adapters import clock
 from iveg.lab.experiment.messages import MessageRecorder, MessageTimes, counts_of
-from iveg.ngsi.codec import format_stamp, write_odometry
+from iveg.ngsi.codec import format_stamp, write_measure
 from tests.builders import START, notification, odometry, origin, pose_value
 
 
@@ -43,7 +43,7 @@ def test_a_message_of_the_robots_topic_is_found_again_in_orions_copy() -> None:
     recorder = MessageRecorder()
     for seq in (7, 8):
         sent = odometry(origin=origin(seq))
-        recorder.heard("/iveg/AGI_odom/attrs", write_odometry(sent))
+        recorder.heard("/iveg/AGI_odom/attrs", write_measure(sent))
     recorder.notified(b"no notification")
     recorder.notified(notification({"base_pose_ground_truth": pose_value(seq=8)}))
 

@@ -172,7 +172,7 @@ def entries(path: Path) -> list[RecordingEntry]:
 
 
 def pose(x: float, seq: int, robot_id: str = "AGI") -> bytes:
-    return codec.write_odometry(odometry(robot_id, x, origin=origin(seq)))
+    return codec.write_measure(odometry(robot_id, x, origin=origin(seq)))
 
 
 def test_a_robot_is_played_from_either_transport_and_each_message_once(
@@ -186,9 +186,9 @@ def test_a_robot_is_played_from_either_transport_and_each_message_once(
     file.add(OWN_ODOM, at(1.3), pose(2.0, 2))
     seen = detection_frame("AGI", detection(x=3.0), origin=origin(1))
     boxes = measure("/iveg/AGI_yolox_bounding_boxes/attrs")
-    file.add(boxes, at(1.4), codec.write_detections(seen))
+    file.add(boxes, at(1.4), codec.write_measure(seen))
     swept = measure("/iveg/AGI_lidar2D/attrs")
-    file.add(swept, at(1.5), codec.write_scan(scan(origin=origin(1))))
+    file.add(swept, at(1.5), codec.write_measure(scan(origin=origin(1))))
     file.add(OWN_ODOM, at(1.6), b"no JSON")
     file.finish()
 
