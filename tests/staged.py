@@ -202,4 +202,4 @@ STAGED = {
 
 def told(known: RobotFacts) -> dict[str, Any]:
     """The situation as a page hears it."""
-    return Situation.of(situation_of(known)).model_dump(mode="json")
+    return Situation.from_value(situation_of(known)).model_dump(mode="json")

@@ -9,7 +9,7 @@ from pathlib import Path
 from iveg import __version__
 from iveg.domain.fleet import is_robot_id
 from iveg.domain.geometry import Pose2D
-from iveg.models.dictionary import LISTS
+from iveg.domain.records import LISTS
 from iveg.settings import Settings
 
 _FARTHEST_M = 1e6

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from iveg.adapters.database_check import check_database
 from iveg.adapters.history.engine import history_url, upgrade
 from iveg.adapters.history.queries import ask_once
-from iveg.adapters.history.stats import HistoryStats, TableStats, read_stats
+from iveg.adapters.history.upkeep import HistoryStats, TableStats, read_stats
 from iveg.cli.arguments import CommandCall
 from iveg.domain.stamps import format_stamp
 

@@ -22,7 +22,6 @@ was slow for another reason is not asked.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, inf
-from typing import cast
 
 from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.detection_rule import RECOVERED, DetectionRule
@@ -406,10 +405,9 @@ def read_alert(record: AlertRecord, now: Instant) -> BookedAlert:
     """An alert of an earlier run as one that is over, with its life as it was."""
     if record.cleared_at is None:
         record = cleared_behind(record, now.wall)
-    priority = cast("Priority", record.priority)
     seen = record.acknowledged_at
     last = AlertOccurrence(
-        priority,
+        record.priority,
         _moment(record.last_raised_at, now),
         _moment(record.cleared_at or now.wall, now),
         None if seen is None else _moment(seen, now),
@@ -419,7 +417,7 @@ def read_alert(record: AlertRecord, now: Instant) -> BookedAlert:
     return BookedAlert(
         record.alert_id,
         Condition(
-            priority,
+            record.priority,
             record.key,
             _subject(record),
             record.robot_id,
@@ -427,7 +425,7 @@ def read_alert(record: AlertRecord, now: Instant) -> BookedAlert:
         ),
         _moment(record.raised_at, now),
         last,
-        unseen=priority if seen is None else None,
+        unseen=record.priority if seen is None else None,
         count=record.count,
     )
 

@@ -1,4 +1,4 @@
-"""What a candidate version of the rule would have done beside the one in force."""
+"""A candidate version of the rule beside the one in force: what each did."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class Doings:
-    """What one version did over a range.
+    """Deeds of one version over a range.
 
     Attributes:
         slowed_s: Reason → seconds of a robot at half speed.

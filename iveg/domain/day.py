@@ -60,7 +60,7 @@ class Passing:
 
 @dataclass(frozen=True, slots=True)
 class EncounterCounts:
-    """How often a robot came to the ring of a person.
+    """Number of times that a robot came to the zone of a person.
 
     Attributes:
         slowed: Those of which the robot itself said that it was slow.

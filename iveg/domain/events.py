@@ -1,9 +1,8 @@
-"""Log lines and conditions of alerts: a template's name and what fills its holes.
+"""Sentences to come: log lines, conditions of alerts, and messages to people elsewhere.
 
-Messages to people outside the page: addresses, and what a message is about.
-
-A message says how grave it is and when, never where or about whom: it passes through
-other people's servers (docs/interfaces/http.md, "Messages").
+Each is the name of a template and what fills its holes.  A message outside the page
+says how grave it is and when, never where or about whom: it passes through other
+people's servers (docs/interfaces/http.md, "Messages").
 """
 
 from collections.abc import Mapping

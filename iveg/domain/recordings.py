@@ -28,7 +28,7 @@ class RecordingFile:
 
 @dataclass(frozen=True)
 class RecordingLimits:
-    """How much is kept; 0: without this limit.
+    """Bounds of what is kept; 0: without this limit.
 
     Attributes:
         days: Days with a recording, the newest first.  A clock that is wrong by years

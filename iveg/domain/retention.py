@@ -1,10 +1,8 @@
-"""How long the history keeps what, and the moments before which rows may go.
+"""Horizons of the history, and room on its disk: what is kept how long.
 
 Horizons are counted by the days that iVeg recorded, not by the clock alone.  A gap
 between two of them counts for three days at most: a clock that is wrong by years takes
 three days of what is kept and no more (docs/decisions/0006-days-that-were-recorded.md).
-
-Room on a disk: when people are told that it runs out, and when it is well again.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -67,21 +65,14 @@ class PurgeStep:
     table: str
 
 
-PURGE_STEPS = (
-    PurgeStep("positions", "detections"),
-    PurgeStep("positions", "decisions"),
-    PurgeStep("positions", "log"),
-    PurgeStep("telemetry", "odometry"),
-    PurgeStep("telemetry", "detections"),
-    PurgeStep("telemetry", "climate"),
-    PurgeStep("telemetry", "readings"),
-    PurgeStep("telemetry", "measurements"),
-    PurgeStep("decisions", "decisions"),
-    PurgeStep("decisions", "commands"),
-    PurgeStep("decisions", "alerts"),
-    PurgeStep("decisions", "log"),
-    PurgeStep("audit", "command_events"),
-    PurgeStep("audit", "audit"),
+_PURGED: Mapping[RetentionKind, Sequence[str]] = {
+    "positions": ("detections", "decisions", "log"),
+    "telemetry": ("odometry", "detections", "climate", "readings", "measurements"),
+    "decisions": ("decisions", "commands", "alerts", "log"),
+    "audit": ("command_events", "audit"),
+}
+PURGE_STEPS = tuple(
+    PurgeStep(kind, table) for kind, tables in _PURGED.items() for table in tables
 )
 """In this order; docs/deployment.md, "How long the history keeps what"."""
 
@@ -115,16 +106,13 @@ class Retention:
             recorded: Days (UTC, since 1970) with a line in the log, newest first; at
                 least as many as the longest horizon, if there are.
         """
-        days: dict[RetentionKind, int] = {
-            "positions": self.positions,
-            "telemetry": self.telemetry,
-            "decisions": self.decisions,
-            "audit": self.audit,
+        horizons: dict[RetentionKind, int] = {
+            kind: getattr(self, kind) for kind in _PURGED
         }
         return {
-            kind: cutoff(horizon, now, recorded)
-            for kind, horizon in days.items()
-            if horizon > 0 and recorded
+            kind: cutoff(days, now, recorded)
+            for kind, days in horizons.items()
+            if days > 0 and recorded
         }
 
 
@@ -138,7 +126,7 @@ def cutoff(days: int, now: float, recorded: Sequence[int]) -> float:
     """
     first, left = int(now // DAY_S), days - 1
     # Days that are still to come are of a clock that was ahead.
-    for day in (one for one in recorded if one < first):
+    for day in (day for day in recorded if day < first):
         counts = min(first - day, GAP_DAYS)
         if left <= counts:
             return min(now - days * DAY_S, (day + counts - left) * DAY_S)

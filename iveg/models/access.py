@@ -1,9 +1,6 @@
-"""Accounts, the links that people sign in with, and open sessions.
+"""Accounts of people, their links and sessions, and programs that may call."""
 
-Programs that may call.
-"""
-
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import Field
 
@@ -15,8 +12,7 @@ from iveg.domain.accounts import (
     SignInMethod,
     TokenScope,
 )
-from iveg.domain.stamps import format_stamp
-from iveg.models.base import Model, stamp
+from iveg.models.base import Model, Stamp
 
 SessionKind = Literal["link", "account", "wall"]
 
@@ -52,8 +48,8 @@ class OwnAccount(Model):
     role: str
     method: SignInMethod = Field(description="How they came in.")
     account: bool = Field(description="They have one; else a link or a token.")
-    signed_in_at: str | None = Field(description="Null for programs.")
-    ends_at: str | None = Field(description="When it ends by itself; null: never.")
+    signed_in_at: Stamp | None = Field(description="Null for programs.")
+    ends_at: Stamp | None = Field(description="When it ends by itself; null: never.")
 
 
 class OpenSession(Model):
@@ -69,13 +65,13 @@ class OpenSession(Model):
     name: str
     role: str = Field(description="That is left now; `expired`: STOP alone.")
     kind: SessionKind = Field(description="`wall`: of a screen, it looks and stops.")
-    began_at: str
-    seen_at: str = Field(description="The last request.")
+    began_at: Stamp
+    seen_at: Stamp = Field(description="The last request.")
     own: bool = Field(description="The one that asks.")
 
 
 class SessionsEnded(Model):
-    """How many sessions have ended.
+    """Number of sessions that have ended.
 
     Attributes:
         ended: How many.
@@ -98,24 +94,22 @@ class UserAccount(Model):
     name: str
     role: PersonRole
     state: AccountState
-    ends_at: str | None = Field(description="When it ends by itself; null: never.")
-    invited_until: str | None = Field(description="Null where no invitation waits.")
+    ends_at: Stamp | None = Field(description="When it ends by itself; null: never.")
+    invited_until: Stamp | None = Field(description="Null where no invitation waits.")
     own: bool = Field(description="Of whoever asks: another admin changes it.")
     provided: bool = Field(
         description="The identity provider vouches for the person and gives the role."
     )
 
     @classmethod
-    def of(cls, account: Account, now: float, *, own: bool = False) -> "UserAccount":
+    def of(cls, account: Account, now: float, *, own: bool = False) -> Self:
         """As it is at this moment (Unix s)."""
         state = account.state(now)
-        return cls(
+        return cls.from_value(
+            account,
             user_id=account.account_id,
-            name=account.name,
-            role=account.role,
             state=state,
-            ends_at=stamp(account.ends_at),
-            invited_until=stamp(account.invited_until if state == "invited" else None),
+            invited_until=account.invited_until if state == "invited" else None,
             own=own,
             provided=bool(account.provider),
         )
@@ -149,23 +143,15 @@ class ProgramToken(Model):
     token_id: str
     name: str
     scope: TokenScope
-    made_at: str
-    used_at: str | None = Field(description="The last time; null: never.")
-    ends_at: str | None = Field(description="When it ends by itself; null: never.")
+    made_at: Stamp
+    used_at: Stamp | None = Field(description="The last time; null: never.")
+    ends_at: Stamp | None = Field(description="When it ends by itself; null: never.")
     over: bool = Field(description="It has ended by itself.")
 
     @classmethod
-    def of(cls, token: ApiToken, now: float) -> "ProgramToken":
+    def of(cls, token: ApiToken, now: float) -> Self:
         """As it is at this moment (Unix s)."""
-        return cls(
-            token_id=token.token_id,
-            name=token.name,
-            scope=token.scope,
-            made_at=format_stamp(token.made_at),
-            used_at=stamp(token.used_at),
-            ends_at=stamp(token.ends_at),
-            over=not token.is_open(now),
-        )
+        return cls.from_value(token, over=not token.is_open(now))
 
 
 class NewToken(Model):

@@ -1,24 +1,25 @@
-"""Base of all models: frozen, only declared fields, encoded by orjson.
+"""Base of all models, and what many are made of: moments, places (m), scans."""
 
-Places in ``map``: points, boxes and the greenhouse (m).
-
-What lasers and cameras have mapped: scans, the costmap, covered aisles (m).
-
-Stored readings of small sensors of robots.
-
-Where a robot is and how it moves, in ``map``.
-"""
-
-from dataclasses import asdict
-from typing import Generic, TypeVar
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any, Final, Generic, Self, TypeVar
 
 import orjson
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    WrapValidator,
+    create_model,
+)
 
-from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.geometry import Twist2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
-from iveg.domain.records import DecisionRecord, DetectionRecord, ReadingRecord
+from iveg.domain.records import SHOWN_COLUMNS, Column, DecisionRecord, DetectionRecord
 from iveg.domain.stamps import format_stamp
 
 Slots = dict[str, str | bool | int | float | None]
@@ -30,11 +31,24 @@ class Model(BaseModel):
 
     model_config = ConfigDict(
         frozen=True,
+        from_attributes=True,
         extra="forbid",
         serialize_by_alias=True,
         validate_by_alias=True,
         validate_by_name=True,
     )
+
+    @classmethod
+    def from_value(cls, source: object, **other: Any) -> Self:
+        """Make it of a value whose members have its names; ``other`` has the rest."""
+        if not other:
+            return cls.model_validate(source)
+        named = {
+            name: getattr(source, name)
+            for name in cls.model_fields
+            if name not in other and hasattr(source, name)
+        }
+        return cls(**named, **other)
 
 
 class Body(BaseModel):
@@ -64,19 +78,98 @@ def _plain(value: object) -> object:
     raise TypeError(type(value).__name__)
 
 
-def moment(at: Instant | None) -> str | None:
-    """An instant as ISO-8601 UTC with milliseconds."""
-    return None if at is None else format_stamp(at.wall)
-
-
-def stamp(wall: float | None) -> str | None:
-    """Unix seconds as ISO-8601 UTC with milliseconds."""
-    return None if wall is None else format_stamp(wall)
+def stamp(at: Instant | float | None) -> str | None:
+    """An instant or Unix seconds as ISO-8601 UTC with milliseconds."""
+    if at is None:
+        return None
+    return format_stamp(at.wall if isinstance(at, Instant) else at)
 
 
 def rounded(value: float | None, digits: int = 3) -> float | None:
     """A number with no more decimals than it can mean."""
     return None if value is None else round(value, digits)
+
+
+def _stamped(at: Any) -> object:
+    return at if isinstance(at, str) else stamp(at)
+
+
+def _whole_or_none(value: object, read: Callable[[object], object]) -> object:
+    try:
+        return read(value)
+    except ValidationError:
+        return None
+
+
+Stamp = Annotated[str, BeforeValidator(_stamped)]
+"""A moment, of an instant or of Unix seconds."""
+Tenth = Annotated[float, AfterValidator(partial(round, ndigits=1))]
+Hundredth = Annotated[float, AfterValidator(partial(round, ndigits=2))]
+Thousandth = Annotated[float, AfterValidator(partial(round, ndigits=3))]
+OR_NONE: Final = WrapValidator(_whole_or_none)
+"""A value that is not whole, as of a damaged row, reads as None."""
+
+
+class Row(Model):
+    """A row of the history, with a key for each column of its record (``row_of``)."""
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, key: str) -> Any:
+            """The value of a column."""
+
+    @classmethod
+    def from_record(cls, record: Any) -> Self:
+        """As it was kept."""
+        return cls.from_value(record)
+
+
+RowModel = TypeVar("RowModel", bound=Row)
+
+
+def row_of(kind: type, *without: str) -> Callable[[type[RowModel]], type[RowModel]]:
+    """Give a model the columns of a record that it does not declare itself.
+
+    Args:
+        kind: The record.
+        without: Columns that it does not have.
+    """
+
+    def give(model: type[RowModel]) -> type[RowModel]:
+        keys: dict[str, Any] = {
+            _key(one): (_type(one), _field(one))
+            for one in SHOWN_COLUMNS[kind]
+            if _key(one) not in (*model.model_fields, *without)
+        }
+        return create_model(
+            model.__name__,
+            __base__=model,
+            __doc__=model.__doc__,
+            __module__=model.__module__,
+            **keys,
+        )
+
+    return give
+
+
+def _key(column: Column) -> str:
+    return column.key if column.transport is None else column.name
+
+
+def _type(column: Column) -> Any:
+    if column.type != "time":
+        return column.hint
+    return Stamp | None if column.may_lack else Stamp
+
+
+def _field(column: Column) -> Any:
+    meaning = column.meaning
+    text = meaning.means
+    if meaning.unit:
+        text = f"{text.removesuffix('.')} ({meaning.unit})."
+    if column.name == column.key:
+        return Field(description=text)
+    return Field(description=text, alias=column.name)
 
 
 class Point(Model):
@@ -94,7 +187,7 @@ class Position(Model):
     z: float
 
     @classmethod
-    def of_record(cls, record: DecisionRecord | DetectionRecord) -> "Position | None":
+    def of_record(cls, record: DecisionRecord | DetectionRecord) -> Self | None:
         """The place of a row; None where it was not known."""
         if record.x is None or record.y is None:
             return None
@@ -171,21 +264,13 @@ class GreenhouseMap(Model):
     obstacles: list[Obstacle]
 
     @classmethod
-    def of(cls, greenhouse: Greenhouse) -> "GreenhouseMap":
+    def of(cls, greenhouse: Greenhouse) -> Self:
         """The greenhouse that is supervised."""
-        return cls(
-            name=greenhouse.name,
-            bounds=Area(**asdict(greenhouse.bounds)),
-            lanes=[
-                Lane(label=lane.label, **asdict(lane.area)) for lane in greenhouse.lanes
-            ],
-            rows=[Area(**asdict(row)) for row in greenhouse.rows],
-            posts=[Post(**asdict(post)) for post in greenhouse.posts],
-            obstacles=[
-                Obstacle(kind=one.kind, **asdict(one.area))
-                for one in greenhouse.obstacles
-            ],
-        )
+        lanes = [Lane.from_value(one.area, label=one.label) for one in greenhouse.lanes]
+        obstacles = [
+            Obstacle.from_value(one.area, kind=one.kind) for one in greenhouse.obstacles
+        ]
+        return cls.from_value(greenhouse, lanes=lanes, obstacles=obstacles)
 
 
 class Scan(Model):
@@ -267,32 +352,6 @@ class Coverage(Model):
     lanes: list[LaneCoverage]
 
 
-class Reading(Model):
-    """One reading: the sensor's own fields by name.
-
-    Attributes:
-        at: When.
-        robot_id: Whose.
-        kind: Name of a small sensor ([mqtt.md](mqtt.md)), such as ``battery``.
-        value: Its keys without the origin.
-    """
-
-    at: str
-    robot_id: str
-    kind: str
-    value: dict[str, JsonValue]
-
-    @classmethod
-    def of_record(cls, record: ReadingRecord) -> "Reading":
-        """As it was kept."""
-        return cls(
-            at=format_stamp(record.at),
-            robot_id=record.robot_id,
-            kind=record.kind,
-            value=dict(record.value or {}),
-        )
-
-
 class Pose(Model):
     """Pose of ``base_link`` in ``map``.
 
@@ -305,11 +364,6 @@ class Pose(Model):
     x: float
     y: float
     yaw: float
-
-    @classmethod
-    def of(cls, pose: Pose2D) -> "Pose":
-        """As the robot measured it."""
-        return cls(x=pose.x, y=pose.y, yaw=pose.yaw)
 
 
 class Twist(Model):
@@ -324,6 +378,6 @@ class Twist(Model):
     angular: float
 
     @classmethod
-    def of(cls, twist: Twist2D) -> "Twist":
+    def of(cls, twist: Twist2D) -> Self:
         """As the robot measured it."""
         return cls(linear=twist.linear_x, angular=twist.angular_z)

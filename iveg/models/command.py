@@ -1,27 +1,31 @@
-"""STOP, release and resume as people follow them, live and remembered.
-
-The answer to a press of STOP, release or resume.
-
-Times of the newest STOPs.
-"""
+"""STOP, release and resume as people follow them, live and remembered."""
 
 from collections.abc import Iterable, Sequence
 from math import isfinite
-from typing import Any, Literal
+from typing import Annotated, Any, Self
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from iveg.domain import stop
 from iveg.domain.alerts import nearest_rank
 from iveg.domain.goals import GoalKind
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
-from iveg.domain.records import ByTransport, CommandEventRecord, CommandRecord, Json
-from iveg.domain.stamps import format_stamp
+from iveg.domain.records import SHOWN_COLUMNS, CommandEventRecord, CommandRecord
 from iveg.domain.stop import StopMachine
-from iveg.domain.stop.commands import Outcome, Times, outcome_of, was_loud
-from iveg.domain.transports import DIRECT, TRANSPORTS, TransportId
-from iveg.models.base import Model, Slots, rounded, stamp
+from iveg.domain.stop.commands import Outcome, outcome_of, was_loud, write_command
+from iveg.domain.transports import DIRECT, TransportId
+from iveg.models.base import (
+    OR_NONE,
+    Hundredth,
+    Model,
+    Row,
+    Slots,
+    Stamp,
+    Tenth,
+    Thousandth,
+    row_of,
+)
 
 AGENT_LATE_S = 1.0
 """An agent that is less behind than this is not worth a sentence."""
@@ -37,52 +41,20 @@ class CommandTimes(Model):
         requested: Accepted by the server.
     """
 
-    pressed: str | None = Field(
+    pressed: Stamp | None = Field(
         description=(
             "By the browser's corrected clock; null where no page told, or it cannot "
             "be."
         )
     )
-    requested: str
-    sent: dict[TransportId, str] = Field(
+    requested: Stamp
+    sent: dict[TransportId, Stamp] = Field(
         description="By transport, when it took it; one that has not is not there."
     )
-    answer: dict[TransportId, str] = Field(
+    answer: dict[TransportId, Stamp] = Field(
         description="By transport, when the robot said by it that it has it."
     )
-    standing: str | None = Field(description="The first standing sample.")
-
-    @classmethod
-    def of(
-        cls,
-        pressed: float | None,
-        requested: float,
-        sent: ByTransport,
-        answer: ByTransport,
-        standing: float | None,
-    ) -> "CommandTimes":
-        """All in Unix seconds."""
-        return cls(
-            pressed=stamp(pressed),
-            requested=format_stamp(requested),
-            sent={one: format_stamp(at) for one, at in sent.items()},
-            answer={one: format_stamp(at) for one, at in answer.items()},
-            standing=stamp(standing),
-        )
-
-    def columns(self) -> dict[str, Any]:
-        """The same under the names that a CSV has."""
-        by_transport = {
-            f"{step}_{one.id}_at": times.get(one.id)
-            for step, times in (("sent", self.sent), ("answer", self.answer))
-            for one in TRANSPORTS
-        }
-        return {
-            "pressed_at": self.pressed,
-            "requested_at": self.requested,
-            "standing_at": self.standing,
-            **by_transport,
-        }
+    standing: Stamp | None = Field(description="The first standing sample.")
 
 
 class CommandRobot(Model):
@@ -95,8 +67,8 @@ class CommandRobot(Model):
     """
 
     v: float
-    report_age_s: float | None
-    moved_m: float
+    report_age_s: Thousandth | None
+    moved_m: Hundredth
 
 
 class CommandStep(Model):
@@ -108,7 +80,7 @@ class CommandStep(Model):
         why: What led to it.
     """
 
-    at: str
+    at: Stamp
     state: str
     why: str
 
@@ -141,14 +113,20 @@ class CommandGoal(Model):
     aisle: str | None
 
 
-class Command(Model):
+@row_of(CommandRecord)
+class Command(Row):
     """One STOP, release, resume or goal.
 
     What only a command that goes on has is null, empty or false in the history.
 
     A STOP ends as ``RUNNING``. ``REPLACED``: another command took over. ``EXPIRED``:
     the robot never confirmed a release or resume, or a crash of the server left the
-    command open.
+    command open. The states are those of [safety.md](../safety.md), of a goal those of
+    [Goal](#goal).
+
+    The ``reason`` is null, ``moved``, ``reasserted``, ``restarted`` (the server was;
+    the audit row names the id that took over), ``release_unconfirmed``, or the robot's
+    code.
 
     A transport is ``ok`` when the robot's answer has come back on it, and ``direct`` of
     a STOP when the broker has it (PUBACK). It is ``pending`` when the order was handed
@@ -158,35 +136,15 @@ class Command(Model):
     are the ids of ``iveg/domain/transports.py``; another transport is one more key.
 
     Attributes:
-        command_id: ULID.
-        robot_id: Whom it is for.
-        kind: What was asked.
-        drill: A proof of STOP, not a need.
-        state: One of the nine states of [safety.md](../safety.md), ``RUNNING``,
-            ``REPLACED`` or ``EXPIRED``, see below; of a goal that of [Goal](#goal).
-        requested_by: Who pressed first.
-        times: When each step came to be known.
-        requested_at: Likewise; this and the five below iVeg's clock (ISO-8601 UTC, ms).
-        sent_fiware_at: When it left by each transport that took it (ISO-8601 UTC, ms).
-        sent_direct_at: When it left by each transport that took it (ISO-8601 UTC, ms).
-        answer_fiware_at: When the robot first said by it that it has it (ISO-8601 UTC,
-            ms).
-        answer_direct_at: When the robot first said by it that it has it (ISO-8601 UTC,
-            ms).
-        standing_at: The first standing sample (ISO-8601 UTC, ms).
-        standstill_ms: First standing sample less the press; null while unknown (ms).
-        tries: How often it was sent before the robot stood, all transports at once
-            counted once.
-        reason: Null, ``moved``, ``reasserted``, ``restarted`` (the server was; the
-            audit row names the id that took over), ``release_unconfirmed``, or the
-            robot's code.
+        times: When each step came to be known; each has a key of its own, too, named as
+            in the CSV.
         requesters: All who pressed.
         hold_id: What a STOP is called at the robot: its own ``command_id`` unless it
             keeps an earlier hold; null for others.
         pressed_doubted: The page told a time that cannot be.
         age_s: Since it was requested (s).
         transports: By transport: ``ok``, ``failed``, ``off``, ``pending`` or
-            ``unknown``, see below.
+            ``unknown``, see above.
         agent_lag_s: How late the IoT Agent was when it was last sent; null if unknown
             (s).
         note: The sentence of that; null where the agent keeps up or nobody knows.
@@ -195,30 +153,16 @@ class Command(Model):
         was_loud: It was UNCONFIRMED or STILL_MOVING at any time.
     """
 
-    command_id: str
-    robot_id: str
-    kind: Literal["stop", "release", "resume", "goal"]
-    state: str
-    requested_by: str
     times: CommandTimes
-    pressed_at: str | None = Field(
-        description="As in ``times``, under the name of the CSV; so the six below."
+    standstill_ms: Thousandth | None = Field(
+        description="First standing sample less the press; null while unknown (ms)."
     )
-    requested_at: str
-    sent_fiware_at: str | None
-    sent_direct_at: str | None
-    answer_fiware_at: str | None
-    answer_direct_at: str | None
-    standing_at: str | None
-    standstill_ms: float | None
-    tries: int
-    reason: str | None
     requesters: list[str]
     hold_id: str | None = None
     pressed_doubted: bool = False
-    age_s: float | None = None
+    age_s: Thousandth | None = None
     transports: dict[str, str]
-    agent_lag_s: float | None = None
+    agent_lag_s: Tenth | None = None
     note: Sentence | None = None
     robot: CommandRobot | None = None
     challenge_fresh: bool = False
@@ -229,7 +173,7 @@ class Command(Model):
         ),
     )
     was_loud: bool = False
-    goal: CommandGoal | None = Field(
+    goal: Annotated[CommandGoal | None, OR_NONE] = Field(
         default=None, description="Of a goal; on ``/live`` goals are the robot's."
     )
     steps: list[CommandStep] = Field(
@@ -241,101 +185,66 @@ class Command(Model):
 
     @classmethod
     def of(
-        cls, of: stop.FollowedCommand, machine: StopMachine, now: Instant
-    ) -> "Command":
+        cls, followed: stop.FollowedCommand, machine: StopMachine, now: Instant
+    ) -> Self:
         """One command with the robot's last word."""
-        times = _times(of.times)
-        return cls(
-            command_id=of.command_id,
-            robot_id=of.robot_id,
-            kind=of.kind,
-            state=of.state,
-            requested_by=of.requesters[0],
-            times=times,
-            **times.columns(),
-            standstill_ms=rounded(of.standstill_ms),
-            tries=of.tries,
-            reason=of.reason,
-            hold_id=of.hold_id,
-            requesters=list(of.requesters),
-            pressed_doubted=of.times.pressed_doubted,
-            age_s=round(now.mono - of.times.requested.mono, 3),
-            transports=dict(of.transports.items()),
-            agent_lag_s=rounded(of.agent_lag_s, 1),
-            note=_note(of),
+        return cls._from_row(
+            write_command(followed),
+            requesters=list(followed.requesters),
+            hold_id=followed.hold_id,
+            pressed_doubted=followed.times.pressed_doubted,
+            age_s=now.mono - followed.times.requested.mono,
+            transports=dict(followed.transports),
+            agent_lag_s=followed.agent_lag_s,
+            note=_note(followed),
             robot=_robot(machine, now),
             challenge_fresh=machine.evidence.report_age(now) <= LIMITS.report_fresh_s,
             steps=[],
         )
 
     @classmethod
-    def of_record(
+    def from_record(
         cls, record: CommandRecord, steps: Sequence[CommandEventRecord] = ()
-    ) -> "Command":
+    ) -> Self:
         """One command as it is remembered, with each of its steps."""
-        times = CommandTimes.of(
-            record.pressed_at,
-            record.requested_at,
-            record.sent_at,
-            record.answer_at,
-            record.standing_at,
-        )
-        return cls(
-            command_id=record.command_id,
-            robot_id=record.robot_id,
-            kind=record.kind,
-            state=record.state,
-            requested_by=record.requested_by,
-            times=times,
-            **times.columns(),
-            standstill_ms=record.standstill_ms,
-            tries=record.tries,
-            reason=record.reason,
+        return cls._from_row(
+            record,
             requesters=[record.requested_by],
             transports={},
             outcome=outcome_of(record),
             was_loud=was_loud((record.state, *(one.state for one in steps))),
-            goal=_goal(record.goal),
-            steps=[
-                CommandStep(at=format_stamp(one.at), state=one.state, why=one.why)
-                for one in steps
-            ],
+            steps=steps,
         )
 
-
-def _goal(found: Json | None) -> CommandGoal | None:
-    """A remembered goal; None where a row holds none that is whole."""
-    try:
-        return None if found is None else CommandGoal.model_validate(found)
-    except ValidationError:
-        return None
-
-
-def _times(of: Times) -> CommandTimes:
-    return CommandTimes.of(
-        of.pressed,
-        of.requested.wall,
-        {one: at.wall for one, at in of.sent.items()},
-        {one: at.wall for one, at in of.answered.items()},
-        None if of.standing is None else of.standing.wall,
-    )
+    @classmethod
+    def _from_row(cls, record: CommandRecord, **other: Any) -> Self:
+        times = {
+            "pressed": record.pressed_at,
+            "requested": record.requested_at,
+            "sent": record.sent_at,
+            "answer": record.answer_at,
+            "standing": record.standing_at,
+        }
+        columns = SHOWN_COLUMNS[CommandRecord]
+        apart = {one.name: one.read(record) for one in columns if one.transport}
+        return cls.from_value(record, times=times, **apart, **other)
 
 
 def _robot(machine: StopMachine, now: Instant) -> CommandRobot:
     report, age = machine.evidence.report, machine.evidence.evidence_age(now)
     return CommandRobot(
         v=0.0 if report is None else report.linear,
-        report_age_s=rounded(age) if isfinite(age) else None,
-        moved_m=round(machine.evidence.moved_m(now), 2),
+        report_age_s=age if isfinite(age) else None,
+        moved_m=machine.evidence.moved_m(now),
     )
 
 
-def _note(of: stop.FollowedCommand) -> Sentence | None:
+def _note(followed: stop.FollowedCommand) -> Sentence | None:
     """Note about a late agent for an order that went through it."""
-    lag = of.agent_lag_s
+    lag = followed.agent_lag_s
     if lag is None or lag <= AGENT_LATE_S:
         return None
-    direct = of.transports[DIRECT.id] not in ("off", "failed")
+    direct = followed.transports[DIRECT.id] not in ("off", "failed")
     key = "stop.note.direct" if direct else "stop.note.fiware"
     return Sentence(key=key, slots={"lag": round(lag, 1)})
 
@@ -352,15 +261,6 @@ class Pressed(Model):
     robot_id: str
     command_id: str
     state: str
-
-    @classmethod
-    def of(cls, command: stop.FollowedCommand) -> "Pressed":
-        """As it stands just after the press."""
-        return cls(
-            robot_id=command.robot_id,
-            command_id=command.command_id,
-            state=command.state,
-        )
 
 
 class FleetPressed(Model):
@@ -384,19 +284,19 @@ class LatencySpread(Model):
     """
 
     count: int
-    p50_ms: float | None
-    p95_ms: float | None
-    max_ms: float | None
+    p50_ms: Tenth | None
+    p95_ms: Tenth | None
+    max_ms: Tenth | None
 
     @classmethod
-    def of(cls, values: Iterable[float | None]) -> "LatencySpread":
-        """Of measured times, to a tenth of a millisecond; missing ones do not count."""
+    def of(cls, values: Iterable[float | None]) -> Self:
+        """Spread of measured times, without missing ones."""
         known = sorted(value for value in values if value is not None)
         return cls(
             count=len(known),
-            p50_ms=rounded(nearest_rank(known, 0.50), 1),
-            p95_ms=rounded(nearest_rank(known, 0.95), 1),
-            max_ms=rounded(nearest_rank(known, 1.0), 1),
+            p50_ms=nearest_rank(known, 0.50),
+            p95_ms=nearest_rank(known, 0.95),
+            max_ms=nearest_rank(known, 1.0),
         )
 
 
@@ -433,6 +333,6 @@ class Latency(Model):
         robots: One for each robot.
     """
 
-    since: str
-    until: str
+    since: Stamp
+    until: Stamp
     robots: list[RobotLatency]

@@ -15,14 +15,18 @@ from pydantic.json_schema import models_json_schema
 
 from iveg.domain.records import Json
 from iveg.models.access import SessionsEnded
-from iveg.models.alert import AcknowledgedAlerts, Note
 from iveg.models.base import Model
-from iveg.models.day import Day
 from iveg.models.dictionary import DictionaryColumn
-from iveg.models.equipment import Measurement
 from iveg.models.health import Recording
+from iveg.models.history import (
+    AcknowledgedAlerts,
+    Day,
+    Measurement,
+    Note,
+    OdometryRow,
+)
 from iveg.models.people import DetectionRow, KeptDetection
-from iveg.models.robot import Device, OdometryRow
+from iveg.models.robot import Device
 from iveg.models.typescript import TOLD
 
 SHOWN: Final[tuple[type[Model], ...]] = (

@@ -1,21 +1,13 @@
-"""Whether the data path from robot to screen is whole, and how soon robots obey.
+"""Health of the data path, latency hop by hop, recordings; how soon robots obey."""
 
-Safety figures: how soon the fleet obeys.
-
-Latency of messages from hop to hop (docs/interfaces/resources.md).
-
-Recordings of what came in.
-"""
-
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import Field
 
 from iveg.domain.alerts import ECHO_S, WINDOW_S, Acknowledgements
 from iveg.domain.latency import Data, Window
 from iveg.domain.recordings import RecordingFile
-from iveg.domain.stamps import format_stamp
-from iveg.models.base import Model, rounded
+from iveg.models.base import Hundredth, Model, Stamp, Tenth
 
 
 class AlertLatency(Model):
@@ -24,7 +16,7 @@ class AlertLatency(Model):
     From the notification of the newest detection frame with the person to the robot's
     own report of the factor, on the server's clock. A robot that judged ahead of iVeg
     is timed by when it said so, from the newest frame that it had been told of. A robot
-    that drives into a ring of which nobody has a frame for 0.25 s is not timed.
+    that drives into a zone of which nobody has a frame for 0.25 s is not timed.
 
     Attributes:
         p50_ms: Quantiles (ms).
@@ -35,12 +27,12 @@ class AlertLatency(Model):
         age_s: Of the newest sample (s).
     """
 
-    p50_ms: float | None
-    p95_ms: float | None
-    p99_ms: float | None
+    p50_ms: Tenth | None
+    p95_ms: Tenth | None
+    p99_ms: Tenth | None
     count: int
-    window_s: float
-    age_s: float | None
+    window_s: float = WINDOW_S
+    age_s: Tenth | None
 
 
 class NotAcknowledged(Model):
@@ -59,9 +51,9 @@ class NotAcknowledged(Model):
 
     count: int
     of: int
-    within_s: float
-    window_s: float
-    age_s: float | None
+    within_s: float = ECHO_S
+    window_s: float = WINDOW_S
+    age_s: Tenth | None
 
 
 class Safety(Model):
@@ -71,29 +63,26 @@ class Safety(Model):
     not_echoed: NotAcknowledged
 
     @classmethod
-    def of(cls, acknowledgements: Acknowledgements) -> "Safety":
+    def of(cls, acknowledgements: Acknowledgements) -> Self:
         """As it stands now."""
-        return cls(
-            alert_latency=AlertLatency(
-                p50_ms=_ms(acknowledgements.p50_s),
-                p95_ms=_ms(acknowledgements.p95_s),
-                p99_ms=_ms(acknowledgements.p99_s),
-                count=acknowledgements.timed,
-                window_s=WINDOW_S,
-                age_s=rounded(acknowledgements.echo_age_s, 1),
-            ),
-            not_echoed=NotAcknowledged(
-                count=acknowledgements.missed,
-                of=acknowledgements.asked,
-                within_s=ECHO_S,
-                window_s=WINDOW_S,
-                age_s=rounded(acknowledgements.asked_age_s, 1),
-            ),
+        latency = AlertLatency(
+            p50_ms=in_ms(acknowledgements.p50_s),
+            p95_ms=in_ms(acknowledgements.p95_s),
+            p99_ms=in_ms(acknowledgements.p99_s),
+            count=acknowledgements.timed,
+            age_s=acknowledgements.echo_age_s,
         )
+        missed = NotAcknowledged(
+            count=acknowledgements.missed,
+            of=acknowledgements.asked,
+            age_s=acknowledgements.asked_age_s,
+        )
+        return cls(alert_latency=latency, not_echoed=missed)
 
 
-def _ms(seconds: float | None) -> float | None:
-    return None if seconds is None else round(1000.0 * seconds, 1)
+def in_ms(seconds: float | None) -> float | None:
+    """Seconds in milliseconds."""
+    return None if seconds is None else 1000.0 * seconds
 
 
 class HopHealth(Model):
@@ -111,10 +100,10 @@ class HopHealth(Model):
 
     hop: str
     state: Literal["ok", "late", "down", "unknown"]
-    age_s: float | None
+    age_s: Tenth | None
     key: str
     detail: str
-    lag_s: float | None = Field(description="How late measures pass it, at least.")
+    lag_s: Tenth | None = Field(description="How late measures pass it, at least.")
     growing: bool
 
 
@@ -149,10 +138,10 @@ class SegmentSpread(Model):
     """
 
     count: int
-    mean_ms: float | None
-    p50_ms: float | None
-    p95_ms: float | None
-    p99_ms: float | None
+    mean_ms: Hundredth | None
+    p50_ms: Hundredth | None
+    p95_ms: Hundredth | None
+    p99_ms: Hundredth | None
 
 
 class LatencyRow(Model):
@@ -179,8 +168,8 @@ class LatencyClock(Model):
 
     robot_id: str
     state: str
-    offset_ms: float | None
-    uncertainty_ms: float | None
+    offset_ms: Hundredth | None
+    uncertainty_ms: Hundredth | None
 
 
 class LatencyTable(Model):
@@ -228,14 +217,9 @@ class Recording(Model):
     name: str = Field(description="Begins with its first moment (UTC).")
     size: int = Field(description="Bytes.")
     is_open: bool = Field(description="Still written; it cannot be fetched yet.")
-    changed_at: str
+    changed_at: Stamp
 
     @classmethod
-    def of(cls, file: RecordingFile) -> "Recording":
+    def of(cls, file: RecordingFile) -> Self:
         """As it lies on the disk."""
-        return cls(
-            name=file.name,
-            size=file.size,
-            is_open=file.is_open,
-            changed_at=format_stamp(file.changed),
-        )
+        return cls.from_value(file, changed_at=file.changed)

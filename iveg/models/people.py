@@ -1,26 +1,25 @@
-"""People, and the robots that are slowed for them.
+"""People, marks of operators, and detections, live and remembered."""
 
-Things that an operator marked as "not a person here".
+from typing import Annotated, Literal, Self
 
-Detections as they are remembered: one box of one frame.
+from pydantic import Field
 
-Detections of robots' cameras as they come in.
-"""
-
-from typing import Literal
-
-from pydantic import Field, ValidationError
-
-from iveg.domain.geometry import Box3D
 from iveg.domain.parameters import Class
-from iveg.domain.records import DetectionRecord, Json
-from iveg.domain.stamps import format_stamp
+from iveg.domain.records import DetectionRecord
 from iveg.domain.tracking import person
 from iveg.domain.tracking.looks import Looks
 from iveg.domain.tracking.people import Placed
 from iveg.domain.tracking.person import Stage
 from iveg.domain.transports import TransportId
-from iveg.models.base import Model, Position
+from iveg.models.base import (
+    OR_NONE,
+    Model,
+    Position,
+    Row,
+    Stamp,
+    Thousandth,
+    row_of,
+)
 from iveg.models.robot import Margin
 
 
@@ -29,12 +28,12 @@ class Acting(Model):
 
     Attributes:
         robot_id: The robot.
-        distance_m: To the centre of the ring (m).
+        distance_m: To the centre of the zone (m).
         in_sight: Whether the robot could see them itself.
     """
 
     robot_id: str
-    distance_m: float
+    distance_m: Thousandth
     in_sight: bool
 
 
@@ -57,16 +56,12 @@ class Evidence(Model):
     probability: float
 
     @classmethod
-    def of(cls, looks: Looks | None) -> "Evidence | None":
-        """What is known; None where nothing adds up."""
+    def of(cls, looks: Looks | None) -> Self | None:
+        """Evidence of these looks; None where nothing adds up."""
         if looks is None:
             return None
-        return cls(
-            looks=looks.count,
-            least=looks.least,
-            most=looks.most,
-            over_s=looks.over_s,
-            probability=round(looks.probability, 4),
+        return cls.from_value(
+            looks, looks=looks.count, probability=round(looks.probability, 4)
         )
 
 
@@ -99,11 +94,11 @@ class Person(Model):
     class_id: str = Field(description="The detector's own class name.")
     stage: Stage
     position: Position
-    radius_m: float | None = Field(description="Radius of the widest ring.")
+    radius_m: float | None = Field(description="Radius of the widest zone.")
     confidence: float
-    first_seen: str
-    last_seen: str
-    age_s: float
+    first_seen: Stamp
+    last_seen: Stamp
+    age_s: Thousandth
     observers: list[str]
     possible: bool = Field(description="Below the threshold but seen again and again.")
     evidence: Evidence | None = Field(
@@ -119,7 +114,7 @@ class Person(Model):
     acting: list[Acting]
     margin: Margin | None
     thing_id: str | None = Field(
-        description="The mark by which it is no person and has no ring."
+        description="The mark by which it is no person and has no zone."
     )
 
 
@@ -137,25 +132,12 @@ class Thing(Model):
 
     thing_id: str
     kind: Literal["person"] = "person"
-    x: float = Field(description="Of its middle in ``map``.")
-    y: float
-    radius_m: float
+    x: Thousandth = Field(description="Of its middle in ``map``.")
+    y: Thousandth
+    radius_m: float = person.RADIUS_M
     by: str
-    since: str
-    until: str = Field(description="When it ends at the latest.")
-
-    @classmethod
-    def of(cls, thing: person.Thing) -> "Thing":
-        """One mark."""
-        return cls(
-            thing_id=thing.thing_id,
-            x=round(thing.x, 3),
-            y=round(thing.y, 3),
-            radius_m=person.RADIUS_M,
-            by=thing.by,
-            since=format_stamp(thing.since.wall),
-            until=format_stamp(thing.until.wall),
-        )
+    since: Stamp
+    until: Stamp = Field(description="When it ends at the latest.")
 
 
 class DetectionBox(Model):
@@ -179,21 +161,9 @@ class DetectionBox(Model):
     zmax: float
     frame_id: str
 
-    @classmethod
-    def of(cls, box: Box3D, frame_id: str) -> "DetectionBox":
-        """As the detector reported it."""
-        return cls(
-            xmin=box.xmin,
-            xmax=box.xmax,
-            ymin=box.ymin,
-            ymax=box.ymax,
-            zmin=box.zmin,
-            zmax=box.zmax,
-            frame_id=frame_id,
-        )
 
-
-class KeptDetection(Model):
+@row_of(DetectionRecord, "at", "x", "y", "z")
+class KeptDetection(Row):
     """One box of one detection frame, as it is remembered.
 
     A [Detection](#detection) of the history. People's places are kept for
@@ -201,88 +171,37 @@ class KeptDetection(Model):
     history keeps what"); then ``position`` and ``box`` are null.
 
     Attributes:
-        robot_id: The observer.
-        stamp: As the robot sent it.
-        class_: Canonical class; null for others.
-        class_id: The detector's word.
-        probability: Confidence (0–1).
         box: As sent; null where it is no longer kept.
-        confident: The rule counts it.
-        person_id: The track.
     """
 
-    robot_id: str
-    stamp: str | None
-    received_at: str | None = Field(
+    received_at: Stamp | None = Field(
         default=None,
         description=(
             "When it reached iVeg; null on ``/live``, where its frame has an age."
         ),
     )
-    class_: str | None = Field(validation_alias="class", serialization_alias="class")
-    class_id: str
-    probability: float
     position: Position | None = Field(
         description="Null in the history, where it is no longer kept."
     )
-    box: DetectionBox | None
-    confident: bool
-    person_id: str | None
+    box: Annotated[DetectionBox | None, OR_NONE]
     peer: str | None = Field(
         default=None, description="The robot of the fleet that was seen."
     )
-    transport: TransportId = Field(description="Transport of the copy that was first.")
-
-    @classmethod
-    def of_record(cls, record: DetectionRecord) -> "KeptDetection":
-        """One detection as it is remembered."""
-        return cls(
-            robot_id=record.robot_id,
-            stamp=record.stamp,
-            received_at=format_stamp(record.at),
-            class_=record.class_,
-            class_id=record.class_id,
-            probability=record.probability,
-            position=Position.of_record(record),
-            box=_box(record.box),
-            confident=record.confident,
-            person_id=record.person_id,
-            transport=TransportId(record.transport),
-        )
 
 
+@row_of(DetectionRecord)
 class DetectionRow(KeptDetection):
     """One detection of the history; what a CSV has beside the rest stands here too.
 
     A [KeptDetection](#keptdetection) with the names of the CSV, whose columns are all
     here: a script reads either.
-
-    Attributes:
-        x: Centre in ``map``; null where it is no longer kept (m).
-        y: Centre in ``map``; null where it is no longer kept (m).
-        z: Centre in ``map``; null where it is no longer kept (m).
     """
 
-    at: str = Field(description="As ``received_at``, under the name of the CSV.")
-    x: float | None
-    y: float | None
-    z: float | None
-
     @classmethod
-    def of_row(cls, record: DetectionRecord) -> "DetectionRow":
+    def from_record(cls, record: DetectionRecord) -> Self:
         """One detection as it is remembered."""
-        kept = dict(KeptDetection.of_record(record))
-        at = format_stamp(record.at)
-        x, y, z = record.x, record.y, record.z
-        return cls(**kept, at=at, x=x, y=y, z=z)
-
-
-def _box(found: Json | None) -> DetectionBox | None:
-    """A remembered box; None where a row holds none that is whole."""
-    try:
-        return None if found is None else DetectionBox.model_validate(found)
-    except ValidationError:
-        return None
+        position = Position.of_record(record)
+        return cls.from_value(record, received_at=record.at, position=position)
 
 
 class Detection(KeptDetection):
@@ -297,20 +216,20 @@ class Detection(KeptDetection):
     @classmethod
     def of(
         cls, one: Placed, robot_id: str, stamp: str | None, transport: TransportId
-    ) -> "Detection":
+    ) -> Self:
         """One detection of a robot's newest frame."""
         x, y, z = one.position
-        return cls(
+        box = DetectionBox.from_value(one.framed.box, frame_id=one.framed.frame_id)
+        return cls.from_value(
+            one,
             robot_id=robot_id,
             stamp=stamp,
-            class_=one.class_,
             class_id=one.detection.class_id,
             probability=one.detection.probability,
             position=Position(x=x, y=y, z=z),
-            box=DetectionBox.of(one.framed.box, one.framed.frame_id),
+            box=box,
             confident=one.kind != "faint",
             person_id=None if one.person is None else one.person.person_id,
-            peer=one.peer,
             transport=transport,
         )
 
@@ -329,5 +248,5 @@ class DetectionFrame(Model):
     robot_id: str
     stamp: str | None
     transport: TransportId
-    age_s: float
+    age_s: Thousandth
     items: list[Detection]

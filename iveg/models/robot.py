@@ -1,81 +1,30 @@
-"""A robot of the fleet, with the age of everything that is said of it.
+"""A robot of the fleet, with the age of everything that is said of it."""
 
-Stored poses and speeds of robots.
-
-Devices of a robot at the IoT Agent, with the time of their last message.
-
-The newest readings of a robot's small sensors.
-
-The gap between a robot and a person, less what stopping takes (ISO 13855).
-
-How it stands with a robot, as every surface says it.
-
-What holds or slows a robot, and why.
-
-A robot's newest goal: who gave it, and what the robot itself said of it.
-
-What a robot says that it applies: factor, holds, faults.
-"""
-
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, Literal, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, Self, get_type_hints
 
 from pydantic import Field, create_model
 
-from iveg.domain import feedback, goals, margins, observations, situation
-from iveg.domain.fleet import RobotProfile
+from iveg.domain import goals, margins, situation
 from iveg.domain.kinds import SENSED, Kind
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Observation
 from iveg.domain.quantities import quantities_of, value_of
-from iveg.domain.records import OdometryRecord
 from iveg.domain.robot_state import Link, RobotState
 from iveg.domain.rule import foresight
 from iveg.domain.stamps import format_stamp
 from iveg.domain.transports import TransportId
-from iveg.models.base import Model, Point, Pose, Slots, Twist, moment, rounded
+from iveg.models.base import (
+    Hundredth,
+    Model,
+    Point,
+    Pose,
+    Slots,
+    Stamp,
+    Tenth,
+    Thousandth,
+    Twist,
+)
 from iveg.models.command import Command
-
-
-class OdometryRow(Model):
-    """Pose in ``map`` (m, rad), speed (m/s, rad/s), speed limit, margin of a robot.
-
-    Attributes:
-        at: IVeg's clock when the rule judged the pose, at most two ticks after its
-            arrival (ISO-8601 UTC, ms).
-        robot_id: The robot.
-        x: Position of ``base_link`` in ``map`` (m).
-        y: Position of ``base_link`` in ``map`` (m).
-        yaw: Heading (rad).
-        linear: Forward speed (m/s).
-        angular: Turn rate (rad/s).
-        limit_factor: IVeg's speed limit: 0, 0.5 or 1.
-        applied_factor: Factor that the robot last said it applies.
-        link: ``LIVE``, ``LATE`` or ``LOST``.
-        margin_m: The robot's least [margin](../safety.md#margins) to anybody who is
-            seen, at most a second old; null: unknown, nobody is seen, or it stands (m).
-        late: Whether the robot kept it during a gap and sent it afterwards
-            ([mqtt.md](mqtt.md#backfill)); nothing acted on it, and ``at`` is when it
-            was measured. ``limit_factor`` is then 0.5, to which a robot keeps that iVeg
-            does not hear, and ``link`` is ``LOST``.
-    """
-
-    at: str
-    robot_id: str
-    x: float
-    y: float
-    yaw: float
-    linear: float
-    angular: float
-    limit_factor: float
-    applied_factor: float | None
-    link: str | None
-    margin_m: float | None
-
-    @classmethod
-    def of_record(cls, record: OdometryRecord) -> "OdometryRow":
-        """As it was kept."""
-        return cls(**asdict(record) | {"at": format_stamp(record.at)})
 
 
 class Device(Model):
@@ -91,7 +40,9 @@ class Device(Model):
     kind: str = Field(
         description="``robot`` for the device of all orders, else what it measures."
     )
-    age_s: float | None = Field(description="Since something came of it; null: never.")
+    age_s: Thousandth | None = Field(
+        description="Since something came of it; null: never."
+    )
 
     @classmethod
     def of(
@@ -100,7 +51,7 @@ class Device(Model):
         suffix: str,
         kind: type[Observation] | None,
         now: Instant,
-    ) -> "Device":
+    ) -> Self:
         """The device of a robot with a suffix; without a kind, that of all orders."""
         heard_at = robot.heard_at
         if kind is not None:
@@ -110,14 +61,14 @@ class Device(Model):
             device=robot.robot_id + suffix,
             robot_id=robot.robot_id,
             kind=suffix[1:] or "robot",
-            age_s=None if heard_at is None else round(max(0.0, now.mono - heard_at), 3),
+            age_s=None if heard_at is None else max(0.0, now.mono - heard_at),
         )
 
 
 class SensorReading(Model):
     """The newest reading of a small sensor; its quantities by name."""
 
-    age_s: float | None
+    age_s: Tenth | None
 
 
 def _reading_model(kind: Kind) -> type[SensorReading]:
@@ -136,11 +87,11 @@ READINGS = {kind.name: _reading_model(kind) for kind in SENSED}
 
 
 def newest_reading(robot: RobotState, kind: Kind, now: Instant) -> SensorReading | None:
-    """What a small sensor said last; None before the first."""
+    """Newest reading of a small sensor; None before the first."""
     read = robot.sensed.get(kind.of)
     if read is None:
         return None
-    age_s = None if read.at is None else round(now.mono - read.at.mono, 1)
+    age_s = None if read.at is None else now.mono - read.at.mono
     return READINGS[kind.name](**value_of(read.observation), age_s=age_s)
 
 
@@ -154,10 +105,10 @@ class MarginParts(Model):
         uncertainty_m: Of detection and pose (m).
     """
 
-    person_walks_m: float
-    reaction_m: float
-    braking_m: float
-    uncertainty_m: float
+    person_walks_m: Hundredth
+    reaction_m: Hundredth
+    braking_m: Hundredth
+    uncertainty_m: float = LIMITS.uncertainty_m
 
 
 class Margin(Model):
@@ -182,37 +133,24 @@ class Margin(Model):
 
     robot_id: str
     person_id: str
-    gap_m: float = Field(description="Between surfaces.")
-    needs_m: float
-    margin_m: float
+    gap_m: Hundredth = Field(description="Between surfaces.")
+    needs_m: Hundredth
+    margin_m: Hundredth
     band: margins.Band
     parts: MarginParts
-    age_s: float = Field(description="Age of the older position.")
+    age_s: Thousandth = Field(description="Age of the older position.")
     braking: float = Field(description="Counted on (m/s²).")
-    walking_speed: float = Field(description="Counted on (m/s).")
+    walking_speed: float = Field(
+        default=LIMITS.walking_m_s, description="Counted on (m/s)."
+    )
 
     @classmethod
-    def of(cls, margin: margins.SafetyMargin | None) -> "Margin | None":
+    def of(cls, margin: margins.SafetyMargin | None) -> Self | None:
         """Margin between a robot and a person; None where there is no pair."""
         if margin is None:
             return None
-        return cls(
-            robot_id=margin.robot_id,
-            person_id=margin.person_id,
-            gap_m=round(margin.gap_m, 2),
-            needs_m=round(margin.needs_m, 2),
-            margin_m=round(margin.margin_m, 2),
-            band=margin.band,
-            parts=MarginParts(
-                person_walks_m=round(margin.walks_m, 2),
-                reaction_m=round(margin.reaction_m, 2),
-                braking_m=round(margin.braking_m, 2),
-                uncertainty_m=LIMITS.uncertainty_m,
-            ),
-            age_s=round(margin.age_s, 3),
-            braking=margin.braking,
-            walking_speed=LIMITS.walking_m_s,
-        )
+        parts = MarginParts.from_value(margin, person_walks_m=margin.walks_m)
+        return cls.from_value(margin, parts=parts)
 
 
 class Situation(Model):
@@ -246,21 +184,6 @@ class Situation(Model):
     factor: float | None = Field(description="The strictest speed factor in force.")
     slots: Slots
 
-    @classmethod
-    def of(cls, found: situation.Situation) -> "Situation":
-        """As the domain found it."""
-        return cls(
-            level=found.level,
-            kind=found.kind,
-            state=found.state,
-            cause=found.cause,
-            why=found.why,
-            about=found.about,
-            action=found.action,
-            factor=found.factor,
-            slots=dict(found.slots),
-        )
-
 
 class SpeedLimit(Model):
     """Greatest speed factor of a robot, and its reason.
@@ -270,30 +193,18 @@ class SpeedLimit(Model):
         reason: ``clear``, ``person``, ``robot``, ``doubt``, ``stale`` or
             ``unsupervised``.
         cause: Id of the person or robot.
-        distance_m: From the robot to the centre of the ring (m).
+        distance_m: From the robot to the centre of the zone (m).
         decision_id: The decision behind it.
     """
 
     speed_factor: float
     reason: str
     cause: str | None
-    distance_m: float | None
+    distance_m: Thousandth | None
     decision_id: str | None
-    foretold_s: float | None = Field(
-        description="Until it reaches the ring of the cause; null: it is inside."
+    foretold_s: Thousandth | None = Field(
+        description="Until it reaches the zone of the cause; null: it is inside."
     )
-
-    @classmethod
-    def of(cls, limit: feedback.SpeedLimit) -> "SpeedLimit":
-        """The speed limit in force."""
-        return cls(
-            speed_factor=limit.speed_factor,
-            reason=limit.reason,
-            cause=limit.cause,
-            distance_m=rounded(limit.distance_m),
-            decision_id=limit.decision_id,
-            foretold_s=rounded(limit.foretold_s),
-        )
 
 
 class Encounter(Model):
@@ -312,26 +223,25 @@ class Encounter(Model):
 
     cause: str
     reason: str
-    in_s: float
-    probability: float = Field(
+    in_s: Tenth
+    probability: Hundredth = Field(
         description="Share of encounters foretold so far ahead that came true."
     )
     place: Point = Field(description="Where the robot will be.")
     centre: Point = Field(description="Where the zone's centre will be.")
-    radius_m: float
+    radius_m: Hundredth
 
     @classmethod
-    def of(cls, foretold: foresight.Encounter, now: Instant) -> "Encounter":
+    def of(cls, foretold: foresight.Encounter, now: Instant) -> Self:
         """At this moment."""
         left_s = foretold.left_s(now)
-        return cls(
-            cause=foretold.zone.cause,
-            reason=foretold.zone.reason,
-            in_s=round(left_s, 1),
-            probability=round(foresight.probability(left_s), 2),
+        centre = Point(x=round(foretold.centre_x, 2), y=round(foretold.centre_y, 2))
+        return cls.from_value(
+            foretold.zone,
+            in_s=left_s,
+            probability=foresight.probability(left_s),
             place=Point(x=round(foretold.x, 2), y=round(foretold.y, 2)),
-            centre=Point(x=round(foretold.centre_x, 2), y=round(foretold.centre_y, 2)),
-            radius_m=round(foretold.zone.radius_m, 2),
+            centre=centre,
         )
 
 
@@ -379,28 +289,24 @@ class Goal(Model):
     by: str
     state: goals.GoalState
     why: str | None
-    sent_at: str
-    answered_at: str | None
-    ended_at: str | None
-    forgotten_at: str | None
+    sent_at: Stamp
+    answered_at: Stamp | None
+    ended_at: Stamp | None
+    forgotten_at: Stamp | None
 
     @classmethod
-    def of(cls, one: goals.FollowedGoal) -> "Goal":
+    def of(cls, one: goals.FollowedGoal) -> Self:
         """At its newest step."""
-        return cls(
+        return cls.from_value(
+            one,
             goal_id=one.goal.goal_id,
-            robot_id=one.robot_id,
             kind=one.goal.kind,
             x=one.goal.x,
             y=one.goal.y,
-            aisle=one.aisle,
-            by=one.by,
-            state=one.state,
-            why=one.why,
-            sent_at=moment(one.sent) or "",
-            answered_at=moment(one.answered),
-            ended_at=moment(one.ended),
-            forgotten_at=moment(one.forgotten),
+            sent_at=one.sent,
+            answered_at=one.answered,
+            ended_at=one.ended,
+            forgotten_at=one.forgotten,
         )
 
 
@@ -416,11 +322,6 @@ class Hold(Model):
     id: str
     source: str
     ack: str
-
-    @classmethod
-    def of(cls, hold: observations.Hold) -> "Hold":
-        """As the robot reported it."""
-        return cls(id=hold.id, source=hold.source, ack=hold.ack)
 
 
 class Fault(Model):
@@ -438,7 +339,7 @@ class Fault(Model):
 
 
 class SeenObstacle(Model):
-    """What a robot's laser sees near it and nothing explains, in ``map`` (m).
+    """Obstacle that a robot's laser sees and nothing explains, in ``map`` (m).
 
     Attributes:
         x: Its middle in ``map`` (m).
@@ -468,30 +369,18 @@ class Applied(Model):
 
     reason: str
     cause: str | None
-    age_s: float
+    age_s: Thousandth
     feedback_age_s: float | None
     faults: list[Fault]
     obstacle: SeenObstacle | None
 
     @classmethod
-    def of(cls, robot: RobotState, now: Instant) -> "Applied | None":
+    def of(cls, robot: RobotState, now: Instant) -> Self | None:
         """From its newest report; None before the first."""
         report, received = robot.safety, robot.safety_received
         if report is None or received is None:
             return None
-        return cls(
-            reason=report.reason,
-            cause=report.cause,
-            age_s=round(now.mono - received.mono, 3),
-            feedback_age_s=report.feedback_age_s,
-            faults=[
-                Fault(code=one.code, about=one.about, for_s=one.for_s)
-                for one in report.faults
-            ],
-            obstacle=None
-            if report.obstacle is None
-            else SeenObstacle(**asdict(report.obstacle)),
-        )
+        return cls.from_value(report, age_s=now.mono - received.mono)
 
 
 Mode = Literal["RUNNING", "SLOW", "STOPPED"]
@@ -509,11 +398,11 @@ class Detector(Model):
     required: bool = Field(description="By the fleet file, and not out of service.")
     missing: bool
     out_by: str | None = Field(description="Who took it out of service.")
-    out_since: str | None
+    out_since: Stamp | None
     out_reason: str | None
 
     @classmethod
-    def of(cls, robot: RobotState, now: Instant) -> "Detector":
+    def of(cls, robot: RobotState, now: Instant) -> Self:
         """At this moment."""
         out = robot.detector.out_of_service
         return cls(
@@ -539,17 +428,15 @@ class Navigation(Model):
     path: list[tuple[float, float]]
 
     @classmethod
-    def of(cls, robot: RobotState) -> "Navigation | None":
+    def of(cls, robot: RobotState) -> Self | None:
         """Intent that the robot reports; None without one."""
         intent = robot.navigation
         if intent is None:
             return None
-        goal = intent.goal
-        return cls(
-            task=intent.task,
-            goal=None if goal is None else Point(x=goal[0], y=goal[1]),
-            path=list(intent.path),
+        goal = (
+            None if intent.goal is None else Point(x=intent.goal[0], y=intent.goal[1])
         )
+        return cls.from_value(intent, goal=goal)
 
 
 class Profile(Model):
@@ -568,17 +455,6 @@ class Profile(Model):
     width: float
     max_speed: float
     turning_radius: float
-
-    @classmethod
-    def of(cls, body: RobotProfile) -> "Profile":
-        """The body of a robot."""
-        return cls(
-            drive=body.drive,
-            length=body.length,
-            width=body.width,
-            max_speed=body.max_speed,
-            turning_radius=body.turning_radius,
-        )
 
 
 class _Robot(Model):
@@ -620,8 +496,8 @@ class _Robot(Model):
     lane: str | None = Field(description="The aisle that it is in.")
     twist: Twist | None
     stamp: str | None = Field(description="As the robot sent it.")
-    received_at: str | None
-    age_s: float | None = Field(description="At most; null while nobody knows.")
+    received_at: Stamp | None
+    age_s: Thousandth | None = Field(description="At most; null while nobody knows.")
     age_estimated: bool
     speed_factor: float | None = Field(
         description="Speed factor that the robot reports to apply."
@@ -642,7 +518,7 @@ class _Robot(Model):
     navigation: Navigation | None
     goal: Goal | None = Field(description="The newest that a person gave it.")
     replay: bool
-    clock_offset_s: float | None
+    clock_offset_s: Thousandth | None
     transport: TransportId = Field(description="Transport that feeds the pose.")
     profile: Profile
     margin: Margin | None

@@ -1,36 +1,26 @@
-"""The detection rule: when somebody counts, and how wide the ring is.
-
-Two versions of the rule on the same inputs, and what each did.
-"""
+"""The detection rule: when somebody counts, how wide a zone is; and a rule on trial."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, create_model
 
-from iveg.domain import comparison, detection_rule
+from iveg.domain import detection_rule
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.parameters import PARAMETERS, Class, Parameter, by_keys
 from iveg.domain.rule import trial
-from iveg.domain.stamps import format_stamp
-from iveg.models.base import Model, stamp
+from iveg.models.base import Model, Stamp, Tenth
 
 
 class Doings(Model):
-    """What one version of the rule did over a range."""
+    """Deeds of one version of the rule over a range."""
 
-    slowed_s: dict[str, float] = Field(
+    slowed_s: dict[str, Tenth] = Field(
         description="Reason → seconds of a robot at half speed."
     )
     encounters: dict[str, int] = Field(
         description="Reason → how often a robot was slowed."
     )
-
-    @classmethod
-    def of(cls, done: comparison.Doings) -> "Doings":
-        """One version's."""
-        seconds = {why: round(s, 1) for why, s in done.slowed_s.items()}
-        return cls(slowed_s=seconds, encounters=dict(done.encounters))
 
 
 class Comparison(Model):
@@ -43,30 +33,16 @@ class Comparison(Model):
         candidate: What the candidate would have done.
     """
 
-    since: str
-    until: str
+    since: Stamp
+    until: Stamp
     against: int = Field(description="The version that was in force.")
-    compared_s: float = Field(description="Time of the range that was compared (s).")
+    compared_s: Tenth = Field(description="Time of the range that was compared (s).")
     in_force: Doings
     candidate: Doings
     would_slow: int = Field(
         description="How often the candidate alone would have slowed a robot."
     )
     would_not: int = Field(description="How often it alone would not have.")
-
-    @classmethod
-    def of(cls, found: comparison.Comparison) -> "Comparison":
-        """One of them."""
-        return cls(
-            since=format_stamp(found.since),
-            until=format_stamp(found.until),
-            against=found.against,
-            compared_s=round(found.compared_s, 1),
-            in_force=Doings.of(found.in_force),
-            candidate=Doings.of(found.candidate),
-            would_slow=found.would_slow,
-            would_not=found.would_not,
-        )
 
 
 class TrialDifference(Model):
@@ -89,26 +65,8 @@ class TrialDifference(Model):
     reason: str
     cause: str | None
     decision_id: str | None
-    began: str
-    ended: str | None
-
-    @classmethod
-    def of(cls, one: trial.Difference) -> "TrialDifference":
-        """One of them."""
-        return cls(
-            robot_id=one.robot_id,
-            kind=one.kind,
-            reason=one.reason,
-            cause=one.cause,
-            decision_id=one.decision_id,
-            began=format_stamp(one.began),
-            ended=stamp(one.ended),
-        )
-
-
-def compared(found: comparison.Comparison | None) -> Comparison | None:
-    """What came of a trial, if there was one."""
-    return None if found is None else Comparison.of(found)
+    began: Stamp
+    ended: Stamp | None
 
 
 def parameter_fields(
@@ -156,7 +114,7 @@ class _Rule(Model):
 
     id: str
     version: int
-    factor: float
+    factor: float = HALF_SPEED
     aliases: dict[str, Class] = Field(
         description="A detector's word → the class that it stands for."
     )
@@ -165,23 +123,12 @@ class _Rule(Model):
         description="What came of the trial that it was before."
     )
     author: str
-    since: str | None
+    since: Stamp | None
 
     @classmethod
     def of(cls, rule: detection_rule.DetectionRule) -> "Rule":
         """One version."""
-        values: dict[str, Any] = by_keys(rule)
-        return Rule(
-            id=rule.id,
-            version=rule.version,
-            factor=HALF_SPEED,
-            aliases=dict(rule.aliases),
-            possible_people=rule.possible_people,
-            comparison=compared(rule.comparison),
-            author=rule.author,
-            since=stamp(rule.since),
-            **values,
-        )
+        return Rule.from_value(rule, **by_keys(rule))
 
 
 if TYPE_CHECKING:
@@ -207,19 +154,16 @@ class Trial(Model):
 
     rule: Rule
     by: str
-    since: str
+    since: Stamp
     comparison: Comparison | None
     differences: list[TrialDifference] = Field(description="Newest first.")
 
     @classmethod
-    def of(cls, tried: trial.Trial) -> "Trial":
+    def of(cls, tried: trial.Trial) -> Self:
         """As it stands."""
-        return cls(
+        return cls.from_value(
+            tried,
             rule=Rule.of(tried.rule),
-            by=tried.by,
-            since=format_stamp(tried.since),
-            comparison=compared(tried.so_far),
-            differences=[
-                TrialDifference.of(one) for one in reversed(tried.differences)
-            ],
+            comparison=tried.so_far,
+            differences=tried.differences[::-1],
         )

@@ -1,4 +1,4 @@
-"""What the page has from Python: ``python -m iveg.models.typescript``.
+"""Files that the page has from Python: ``python -m iveg.models.typescript``.
 
 The output, the types of the models (``static/js/types.d.ts``), the small sensors and
 the order of situations (``static/js/core``), is checked in; a test fails when it is
@@ -17,15 +17,13 @@ from iveg.domain.quantities import flags_of, quantities_of
 from iveg.domain.records import Json
 from iveg.domain.situation import ORDER
 from iveg.models.access import Invitation, NewToken, OpenSession, OwnAccount, SignInCode
-from iveg.models.alert import AuditEntry
-from iveg.models.base import Costmap, Coverage, Model, Reading, Scan
+from iveg.models.base import Costmap, Coverage, Model, Scan
 from iveg.models.command import FleetPressed, Latency
-from iveg.models.decision import Decision
-from iveg.models.equipment import ClimateReading
 from iveg.models.health import LatencyTable
+from iveg.models.history import AuditEntry, Decision, Reading
 from iveg.models.people import Thing
 from iveg.models.rule import Trial
-from iveg.models.snapshot import PastWorld, Snapshot
+from iveg.models.snapshot import ClimateReading, PastWorld, Snapshot
 
 TOLD: tuple[type[Model], ...] = (
     Snapshot,

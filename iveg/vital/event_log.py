@@ -37,8 +37,8 @@ from iveg.domain.records import (
     ReadingRecord,
 )
 from iveg.domain.robot_state import RobotState
-from iveg.domain.stamps import wall_of
 from iveg.domain.stop import Changed, Closed, FollowedCommand
+from iveg.domain.stop.commands import write_command
 from iveg.domain.tracking.people import Placed
 from iveg.vital import topics
 from iveg.vital.evidence import left_behind, record_of
@@ -180,24 +180,7 @@ class EventLog:
         self, command: FollowedCommand, changed: Changed | None, at: Instant
     ) -> None:
         """Record a command that is new or has taken a step."""
-        times = command.times
-        self._sink.enqueue(
-            CommandRecord(
-                command_id=command.command_id,
-                robot_id=command.robot_id,
-                kind=command.kind,
-                state=command.state,
-                requested_by=command.requesters[0],
-                requested_at=times.requested.wall,
-                sent_at={one: at.wall for one, at in times.sent.items()},
-                answer_at={one: at.wall for one, at in times.answered.items()},
-                standing_at=wall_of(times.standing),
-                standstill_ms=command.standstill_ms,
-                tries=command.tries,
-                reason=command.reason,
-                pressed_at=times.pressed,
-            )
-        )
+        self._sink.enqueue(write_command(command))
         if changed is not None:
             self._audit(command, changed.state, changed.why or changed.key, at)
         self.supervision.tell(

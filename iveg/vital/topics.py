@@ -11,14 +11,14 @@ from functools import lru_cache
 from typing import Any, Literal
 
 from iveg.domain.observations import Instant
-from iveg.models.alert import Alert, LogEntry
 from iveg.models.base import GreenhouseMap, Scan
 from iveg.models.command import Command
-from iveg.models.equipment import Climate, Tile
 from iveg.models.health import Health
+from iveg.models.history import Alert, LogEntry
 from iveg.models.people import DetectionFrame, Person
 from iveg.models.robot import Robot
 from iveg.models.rule import Rule
+from iveg.models.snapshot import Climate, Tile
 
 Pace = Literal["at once", "frame", "read-out", "picture"]
 """At once, past all telemetry; in each frame; as digits are read; as pictures are."""

@@ -1,4 +1,4 @@
-"""The state of the pipeline as models: built on request; only alerts are kept."""
+"""The state of the pipeline as models, built on request."""
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable
@@ -6,7 +6,7 @@ from itertools import islice, takewhile
 
 from iveg.comfort.situations import Situations, fresh_report
 from iveg.domain import margins as margins_
-from iveg.domain.alerts import BookedAlert, acknowledgements_of
+from iveg.domain.alerts import acknowledgements_of
 from iveg.domain.geometry import Pose2D
 from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import Instant
@@ -16,12 +16,11 @@ from iveg.domain.rule.zones import ZoneEntry
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import FollowedCommand, StopMachine
 from iveg.domain.tracking.person import TrackedPerson
-from iveg.models.alert import Alert, LogEntry
-from iveg.models.base import GreenhouseMap, Pose, Position, Scan, Twist, moment, rounded
+from iveg.models.base import GreenhouseMap, Pose, Position, Scan, Twist, stamp
 from iveg.models.command import Command as CommandModel
-from iveg.models.equipment import Climate, Tile
 from iveg.models.health import Health, Safety
 from iveg.models.health import HopHealth as HopModel
+from iveg.models.history import Alert, LogEntry
 from iveg.models.people import Acting, Detection, DetectionFrame, Evidence
 from iveg.models.people import Person as PersonModel
 from iveg.models.robot import (
@@ -41,6 +40,7 @@ from iveg.models.robot import (
     SpeedLimit,
 )
 from iveg.models.rule import Rule
+from iveg.models.snapshot import Climate, Tile
 from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.pipeline import Pipeline
 from iveg.vital.health_monitor import HopHealth
@@ -69,8 +69,6 @@ class Views:
         self._health_monitor = parts.core.health_monitor
         self._equipment = parts.equipment.equipment
         self._counters = counters or parts.counters
-        self._alerts: dict[str, tuple[BookedAlert, Alert]] = {}
-        """Made for the last list, and of what: in a flood few of many have changed."""
 
     # --- robots -------------------------------------------------------------------
 
@@ -98,18 +96,18 @@ class Views:
         return Robot(
             robot_id=robot_id,
             link=robot.link(now),
-            situation=Situation.of(self._situations.of(robot, machine, now)),
+            situation=Situation.from_value(self._situations.of(robot, machine, now)),
             mode=self._mode(robot, machine, now),
-            pose=None if odometry is None else Pose.of(odometry.pose),
+            pose=None if odometry is None else Pose.from_value(odometry.pose),
             lane=None if odometry is None else self._lane(odometry.pose),
             twist=None if odometry is None else Twist.of(odometry.twist),
             stamp=None if odometry is None else odometry.origin.stamp,
-            received_at=moment(robot.odometry_received),
-            age_s=rounded(age),
+            received_at=stamp(robot.odometry_received),
+            age_s=age,
             age_estimated=robot.estimated_since is not None,
             speed_factor=None if safety is None else safety.speed_factor,
             applied=Applied.of(robot, now),
-            speed_limit=SpeedLimit.of(self._evaluator.speed_limits[robot_id]),
+            speed_limit=SpeedLimit.from_value(self._evaluator.speed_limits[robot_id]),
             encounters=[
                 Encounter.of(one, now)
                 for one in self._evaluator.encounters(robot_id, now)
@@ -120,15 +118,17 @@ class Views:
             ],
             detector=Detector.of(robot, now),
             refused=robot.refused,
-            holds=[] if safety is None else [Hold.of(one) for one in safety.holds],
+            holds=[]
+            if safety is None
+            else [Hold.from_value(one) for one in safety.holds],
             stop=None if machine.stop is None else self.command(machine.stop, now),
             stop_state=machine.state,
             navigation=Navigation.of(robot),
             goal=None if goal is None else Goal.of(goal),
             replay=robot.is_replay,
-            clock_offset_s=rounded(robot.clock.offset_s(now)),
+            clock_offset_s=robot.clock.offset_s(now),
             transport=self._world.feed(robot_id).transport(now.mono),
-            profile=Profile.of(robot.profile),
+            profile=Profile.from_value(robot.profile),
             margin=Margin.of(self._margin(robot, margins, now)),
             cmd_status=robot.command_status,
             **Robot.sensed(robot, now),
@@ -209,7 +209,7 @@ class Views:
     ) -> PersonModel:
         newest, rule = person.newest, self._evaluator.rule
         x, y = newest.x, newest.y
-        rings = self._people.zone_radii(person, rule, now)
+        zones = self._people.zone_radii(person, rule, now)
         thing = self._people.things.explain(person, now)
         return PersonModel(
             person_id=person.person_id,
@@ -217,18 +217,18 @@ class Views:
             class_id=newest.class_id,
             stage=person.stage(now),
             position=Position(x=x, y=y, z=newest.z),
-            radius_m=max((radius for _, radius in rings), default=None),
+            radius_m=max((radius for _, radius in zones), default=None),
             confidence=newest.confidence,
             first_seen=format_stamp(person.first_seen.wall),
             last_seen=format_stamp(newest.at.wall),
-            age_s=round(person.age_s(now), 3),
+            age_s=person.age_s(now),
             observers=person.observers(now),
             possible=newest.possible or newest.laser,
             evidence=Evidence.of(newest.looks),
             doubtful=newest.reach_m > 0.0,
             decision_id=max((one.decision_id for one in entries), default=None),
             lane=self._greenhouse.lane_at(x, y),
-            acting=[_acting(one) for one in entries],
+            acting=[Acting.from_value(one) for one in entries],
             margin=Margin.of(margins.of_person(person.person_id)),
             thing_id=None if thing is None else thing.thing_id,
         )
@@ -243,7 +243,7 @@ class Views:
             robot_id=robot_id,
             stamp=stamp,
             transport=transport,
-            age_s=round(now.mono - robot.detections_at, 3),
+            age_s=now.mono - robot.detections_at,
             items=[
                 Detection.of(one, robot_id, stamp, transport)
                 for one in self._evaluator.tracking.placed.get(robot_id, [])
@@ -278,17 +278,11 @@ class Views:
         """All alerts that people should see now, gravest first."""
         waiting = self._evaluator.alerts.waiting
         waiting.sort(key=lambda one: (one.priority, -one.last.raised.wall))
-        before, self._alerts = self._alerts, {}
-        for one in waiting:
-            kept = before.get(one.alert_id)
-            if kept is None or kept[0] is not one:
-                kept = one, Alert.of(one)
-            self._alerts[one.alert_id] = kept
-        return [alert for _, alert in self._alerts.values()]
+        return [Alert.of(one) for one in waiting]
 
     def log(self, lines: Iterable[LogRecord]) -> list[LogEntry]:
         """Lines of the log."""
-        return [LogEntry.of_record(line) for line in lines]
+        return [LogEntry.from_record(line) for line in lines]
 
     def log_since(self, line_id: int) -> list[LogEntry]:
         """The lines after one, oldest first; of many the newest."""
@@ -311,7 +305,7 @@ class Views:
         )
 
     def safety(self, now: Instant) -> Safety:
-        """How soon the fleet obeys."""
+        """Reaction times of the fleet."""
         return Safety.of(acknowledgements_of(self._evaluator.live_decisions(), now))
 
     def climate(self, now: Instant) -> Climate | None:
@@ -339,20 +333,5 @@ class Views:
 
 
 def _hop(hop: HopHealth) -> HopModel:
-    return HopModel(
-        hop=hop.name.value,
-        state=hop.state,
-        age_s=rounded(hop.age_s, 1),
-        key=f"health.{hop.name.label}.{hop.state}",
-        detail=hop.detail,
-        lag_s=rounded(hop.lag_s, 1),
-        growing=hop.growing,
-    )
-
-
-def _acting(entry: ZoneEntry) -> Acting:
-    return Acting(
-        robot_id=entry.robot_id,
-        distance_m=round(entry.distance_m, 3),
-        in_sight=entry.in_sight,
-    )
+    key = f"health.{hop.name.label}.{hop.state}"
+    return HopModel.from_value(hop, hop=hop.name.value, key=key)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from iveg.adapters.recordings.reading import finish_broken, read_messages
+from iveg.adapters.recordings.mcap_file import finish_broken, read_messages
 from iveg.adapters.recordings.recorder import WRITE_S
 from iveg.adapters.recordings.writer import SETTLE_S
 from tests.processes import ROOT, children_of, until

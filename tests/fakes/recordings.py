@@ -1,11 +1,12 @@
 """Recordings without a process of their own: in a folder, and written in place."""
 
 from collections.abc import Callable, Sequence
+from io import BytesIO
 from pathlib import Path
 
 from iveg.adapters.files import disk_space
 from iveg.adapters.recordings.directory import RecordingDirectory
-from iveg.adapters.recordings.incoming import Unpacking
+from iveg.adapters.recordings.incoming import unpack
 from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import RecordingWriter, WriterSetup
 from iveg.domain.recordings import RecordingFile
@@ -34,11 +35,9 @@ class WriterInPlace:
         read_space: Callable[[Path], DiskSpace] = disk_space,
     ) -> None:
         self.writer = RecordingWriter(setup, read_space)
-        self._unpacking = Unpacking()
 
     def write(self, recorder: InputRecorder, now: float) -> None:
         """Write what waits; ``now`` is monotonic (s)."""
-        for piece in recorder.take_waiting():
-            for came in self._unpacking.feed(piece):
-                self.writer.write_input(came)
+        for came in unpack(BytesIO(b"".join(recorder.take_waiting()))):
+            self.writer.write_input(came)
         self.writer.keep_house(now)

@@ -2,17 +2,13 @@
 
 A page ends in a cursor that names its last row, not a count of rows, so that neither
 new rows nor deep pages make the next one wrong or slow.
-
-The lists of the history: which records each has, and how it is sorted.
-
-Places between two pages of a list, as opaque texts that fit into a URL.
 """
 
 import base64
 import binascii
 import string
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from hashlib import blake2s
 from typing import Any, Generic, TypeVar
 
@@ -35,6 +31,7 @@ from iveg.adapters.history import tables
 from iveg.adapters.history.tables import TABLE_MAPPINGS
 from iveg.domain.errors import UnreadableError
 from iveg.domain.records import (
+    COLUMNS,
     AlertRecord,
     AuditRecord,
     CommandRecord,
@@ -55,113 +52,45 @@ class ListOf(Generic[R]):
     """Listing of one kind of record.
 
     Attributes:
-        at: The column that orders it; ``key`` settles equal times.
         classes: Columns that the class filter looks at.
         which: Rows that are in the list at all; None: every one of the table.
         sorts: Columns that it can be sorted by beside its time, by name.
     """
 
     kind: type[R]
-    table: Table
-    at: Column[float]
-    key: Column[int] | Column[str]
-    classes: tuple[Column[str], ...] = ()
-    probability: Column[float] | None = None
+    classes: tuple[str, ...] = ()
     which: ColumnElement[bool] | None = None
-    sorts: Mapping[str, Column[str]] = field(default_factory=dict)
+    sorts: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def table(self) -> Table:
+        """The table of its records."""
+        return TABLE_MAPPINGS[self.kind].table
+
+    @property
+    def at(self) -> Column[Any]:
+        """The column that orders it."""
+        return TABLE_MAPPINGS[self.kind].at
+
+    @property
+    def key(self) -> Column[Any]:
+        """The column that settles equal times."""
+        return TABLE_MAPPINGS[self.kind].key
 
 
-DECISIONS = ListOf(
-    DecisionRecord,
-    tables.decisions,
-    tables.decisions.c.started_at,
-    tables.decisions.c.decision_id,
-    (tables.decisions.c.class_, tables.decisions.c.class_id),
-    tables.decisions.c.confidence,
-    sorts={"robot": tables.decisions.c.robot_id},
-)
-
-
-DETECTIONS = ListOf(
-    DetectionRecord,
-    tables.detections,
-    tables.detections.c.at,
-    tables.detections.c.row_id,
-    (tables.detections.c.class_, tables.detections.c.class_id),
-    tables.detections.c.probability,
-)
-
-
+_SEEN = "class_", "class_id"
+DECISIONS = ListOf(DecisionRecord, _SEEN, sorts={"robot": "robot_id"})
+DETECTIONS = ListOf(DetectionRecord, _SEEN)
 TRACKS = replace(DETECTIONS, which=tables.detections.c.person_id.is_not(None))
-
-
-ODOMETRY = ListOf(
-    OdometryRecord,
-    tables.odometry,
-    tables.odometry.c.at,
-    tables.odometry.c.row_id,
-)
-
-
-COMMANDS = ListOf(
-    CommandRecord,
-    tables.commands,
-    tables.commands.c.requested_at,
-    tables.commands.c.command_id,
-    sorts={"robot": tables.commands.c.robot_id, "kind": tables.commands.c.kind},
-)
-
-
-ALERTS = ListOf(
-    AlertRecord,
-    tables.alerts,
-    tables.alerts.c.last_raised_at,
-    tables.alerts.c.alert_id,
-    sorts={"robot": tables.alerts.c.robot_id, "priority": tables.alerts.c.priority},
-)
-
-
-LOG = ListOf(
-    LogRecord,
-    tables.log,
-    tables.log.c.at,
-    tables.log.c.row_id,
-    (tables.log.c.class_,),
-    sorts={"robot": tables.log.c.robot_id, "kind": tables.log.c.kind},
-)
-
-
+ODOMETRY = ListOf(OdometryRecord)
+COMMANDS = ListOf(CommandRecord, sorts={"robot": "robot_id", "kind": "kind"})
+ALERTS = ListOf(AlertRecord, sorts={"robot": "robot_id", "priority": "priority"})
+LOG = ListOf(LogRecord, ("class_",), sorts={"robot": "robot_id", "kind": "kind"})
 NOTE = "log.note"
-
-
 NOTES = replace(LOG, which=tables.log.c.key == NOTE)
-
-
-READINGS = ListOf(
-    ReadingRecord,
-    tables.readings,
-    tables.readings.c.at,
-    tables.readings.c.row_id,
-    (tables.readings.c.kind,),
-)
-
-
-MEASUREMENTS = ListOf(
-    MeasurementRecord,
-    tables.measurements,
-    tables.measurements.c.at,
-    tables.measurements.c.row_id,
-    (tables.measurements.c.entity_id, tables.measurements.c.attribute),
-)
-
-
-AUDIT = ListOf(
-    AuditRecord,
-    tables.audit,
-    tables.audit.c.at,
-    tables.audit.c.seq,
-    (tables.audit.c.action, tables.audit.c.name),
-)
+READINGS = ListOf(ReadingRecord, ("kind",))
+MEASUREMENTS = ListOf(MeasurementRecord, ("entity_id", "attribute"))
+AUDIT = ListOf(AuditRecord, ("action", "name"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,13 +193,13 @@ def read_page(connection: Connection, of: ListOf[R], asked: Filter) -> Page[R]:
     if len(rows) <= limit:
         return Page(items, None)
     last = rows[limit - 1]
-    value = None if not group else last[of.sorts[_name(asked.sort)]] or ""
+    value = None if not group else last[of.table.c[of.sorts[_name(asked.sort)]]] or ""
     asked_for = question_of(of, asked)
     return Page(items, Cursor(last[of.at], last[of.key], asked_for, value))
 
 
 def question_of(of: ListOf[Any], asked: Filter) -> str:
-    """What tells a question from others: its list, filters and order, short."""
+    """Digest of a question: its list, filters and order."""
     rows = of.table.name, str(of.which), replace(asked, limit=0, cursor=None)
     return blake2s(repr(rows).encode(), digest_size=6).hexdigest()
 
@@ -280,14 +209,14 @@ def _name(sort: str) -> str:
 
 
 def _group(of: ListOf[R], sort: str) -> tuple[ColumnElement[Any], ...]:
-    """What a list is sorted by before its time; empty: by that alone."""
+    """Columns that sort a list before its time; empty: by that alone."""
     if _name(sort) == BY_TIME:
         return ()
-    return _as_counted(func.coalesce(of.sorts[_name(sort)], ""))
+    return _as_counted(func.coalesce(of.table.c[of.sorts[_name(sort)]], ""))
 
 
 def _as_counted(name: ColumnElement[str]) -> tuple[ColumnElement[Any], ...]:
-    """What sorts names that may end in a number as people count: R2 before R10.
+    """Sort keys of names that may end in a number, as people count: R2 before R10.
 
     Of the names that differ by that number alone, the shorter has the smaller.
     """
@@ -308,7 +237,7 @@ def _order(
 def _after(
     of: ListOf[R], group: tuple[ColumnElement[Any], ...], asked: Filter
 ) -> Iterator[ColumnElement[bool]]:
-    """What comes after the cursor."""
+    """Condition of the rows after the cursor."""
     if (cursor := asked.cursor) is None:
         return
     falls = asked.sort.startswith("-")
@@ -339,13 +268,14 @@ def conditions(of: ListOf[R], asked: Filter) -> Iterator[ColumnElement[bool]]:
     if asked.person is not None and person is not None:
         yield person == asked.person
     if asked.class_ is not None and of.classes:
-        yield or_(*(column == asked.class_ for column in of.classes))
-    if asked.min_probability is not None and of.probability is not None:
-        yield of.probability >= asked.min_probability
+        yield or_(*(columns[name] == asked.class_ for name in of.classes))
+    probability = columns.get("probability", columns.get("confidence"))
+    if asked.min_probability is not None and probability is not None:
+        yield probability >= asked.min_probability
 
 
 def record_of(kind: type[R], row: RowMapping) -> R:
     """A row as the record that was offered; what a damaged row lacks is its default."""
-    columns = TABLE_MAPPINGS[kind].table.c
-    values = {field.name: row[columns[field.name]] for field in fields(kind)}
-    return kind(**{name: one for name, one in values.items() if one is not None})
+    table = TABLE_MAPPINGS[kind].table
+    values = {one.key: row[table.c[one.key]] for one in COLUMNS[kind]}
+    return kind(**{key: one for key, one in values.items() if one is not None})

@@ -1,13 +1,8 @@
-"""The history's reading side: queries of the REST API.
+"""The history's reading side: queries of the REST API, and what earlier versions kept.
 
 Every query runs in a thread of its own small pool, so that a long query neither holds
-up the event loop nor takes the threads that a STOP's journal needs.
-
-One question to the history's database, which a connection answers.
-
-Accounts and tokens of earlier versions, which kept them in the history's database.
-
-They are copied once; the tables stay for one version more.
+up the event loop nor takes the threads that a STOP's journal needs.  Accounts and
+tokens of earlier versions are copied once; their tables stay for one version more.
 """
 
 import asyncio
@@ -71,7 +66,7 @@ def ask_once(
     *args: P.args,
     **named: P.kwargs,
 ) -> T:
-    """The same, of a database that is asked nothing else."""
+    """Answer of a database that is asked nothing else."""
     engine = reading_engine(url)
     try:
         return ask(engine, question, *args, **named)
@@ -102,7 +97,7 @@ class Queries:
         *args: P.args,
         **named: P.kwargs,
     ) -> T:
-        """What a question finds, as ``speed_series`` of ``series``."""
+        """Answer of a question, such as ``speed_series`` of ``series``."""
 
         def asked() -> T:
             return ask(self._engine, question, *args, **named)

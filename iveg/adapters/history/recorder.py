@@ -1,13 +1,12 @@
 """Moves offered records into the database, without ever making the pipeline wait.
 
-One task gathers batches, one thread writes them.  Rows of orders go to the journal at
-once (``flushed``), which holds them until the database has them; while it is away, all
-others wait in a bounded queue, of which the oldest give way::
+One task gathers batches, one thread writes them, each in one transaction.  Rows of
+orders go to the journal at once (``flushed``), which holds them until the database has
+them; while it is away, all others wait in a bounded queue, of which the oldest give
+way::
 
     enqueue ──> queue ──> batch ──> database
        └─ orders ─> journal ─┘  at the next start
-
-Batches of records into the tables: one transaction each, all or nothing.
 
 Rows of one kind that the database does not take for their values are counted and left
 out, so that they cannot hold up everything behind them.
@@ -17,7 +16,7 @@ import asyncio
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -40,6 +39,7 @@ from iveg.adapters.journal import FileJournal
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.observations import Instant
 from iveg.domain.records import (
+    COLUMNS,
     Record,
     is_order,
 )
@@ -48,7 +48,6 @@ from iveg.vital.record import CAPACITY, RecordQueue, Waiting
 _log = logging.getLogger(__name__)
 _Row = dict[str, object]
 _T = TypeVar("_T")
-_FIELDS = {kind: tuple(f.name for f in fields(kind)) for kind in TABLE_MAPPINGS}
 _VALUE_ERRORS = (ValueError, TypeError, OverflowError)
 
 
@@ -141,7 +140,7 @@ def _values(rows: Iterable[Waiting], mapping: TableMapping) -> list[_Row]:
 
 
 def _columns(record: Record) -> _Row:
-    return {name: getattr(record, name) for name in _FIELDS[type(record)]}
+    return {one.key: one.read(record) for one in COLUMNS[type(record)]}
 
 
 @cache

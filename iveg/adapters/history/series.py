@@ -1,15 +1,7 @@
-"""Series for charts, thinned in the database to what a screen can show.
+"""Series and counts for charts and the evening sheet, thinned in the database.
 
 A range with few rows is answered row by row; a longer one in equal slices of time, each
 with its mean speed and its strictest factor, so that a short slow-down is never lost.
-
-Rounding that SQLite and PostgreSQL do alike.
-
-Detections of a range by class and confidence.
-
-Times of the newest STOPs of a range.
-
-Where robots and people were in each second of a range.
 """
 
 from collections.abc import Iterable, Iterator, Sequence

@@ -1,28 +1,23 @@
-"""The history as its retention sees it: pieces of the one writer, and the disk.
+"""Upkeep of the history: rows whose time is over go, in pieces of one transaction each.
 
-Indexes of a few rows of large tables.
-
-A query finds one by its condition, word for word.
-
-Deletion of rows whose time is over, in pieces of one transaction each.
-
-What the history still holds: days, its oldest rows, and what of a day is gone.
+Beside it stands what the history holds: its size, its days, and what of a day is gone.
 """
 
 import asyncio
 from collections.abc import Callable, Coroutine, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 from sqlalchemy import (
-    Column,
     ColumnElement,
     Connection,
-    Index,
+    Integer,
     Table,
     TextClause,
     and_,
+    cast,
     delete,
     exists,
     func,
@@ -32,76 +27,33 @@ from sqlalchemy import (
     true,
     update,
 )
+from sqlalchemy.exc import OperationalError
 
 from iveg.adapters.files import disk_space
 from iveg.adapters.history import tables
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder
-from iveg.adapters.history.tables import decisions, detections, log, metadata, odometry
+from iveg.adapters.history.tables import (
+    AGES,
+    decisions,
+    detections,
+    log,
+    metadata,
+    odometry,
+)
 from iveg.domain.errors import HopError
 from iveg.domain.retention import DAY_S, DiskSpace, PurgeStep
-
-__all__ = ["metadata"]
-
-
-def _partial(
-    name: str,
-    columns: tuple[Column[Any], ...],
-    sqlite: str,
-    postgresql: str | None = None,
-) -> Index:
-    return Index(
-        name,
-        *columns,
-        sqlite_where=text(sqlite),
-        postgresql_where=text(postgresql or sqlite),
-    )
-
-
-# Rows that have a place still, by which they are found to lose it.
-placed_detections = _partial(
-    "ix_detections_placed", (detections.c.at,), "x IS NOT NULL"
-)
-placed_decisions = _partial(
-    "ix_decisions_placed", (decisions.c.started_at,), "x IS NOT NULL"
-)
-placed_lines = _partial(
-    "ix_log_placed", (log.c.at,), "instr(slots, '\"x\":') > 0", "slots ? 'x'"
-)
-
 
 PIECE = 10_000
 """Rows of one transaction; more where many are of one moment."""
 
-_AGES_BY = {
-    "decisions": tables.decisions.c.started_at,
-    "commands": tables.commands.c.requested_at,
-    "alerts": tables.alerts.c.last_raised_at,
-    "api_tokens": tables.api_tokens.c.made_at,
-    "accounts": tables.accounts.c.since,
-}
-"""Tables whose rows age by another column than ``at``."""
 _OVER: Mapping[str, ColumnElement[bool]] = {
     # What goes on is kept whatever its age.
     "decisions": tables.decisions.c.ended_at.is_not(None),
     "commands": ~tables.is_open_command(),
     "alerts": tables.alerts.c.cleared_at.is_not(None),
 }
-_PLACED: Mapping[str, Index] = {
-    "detections": placed_detections,
-    "decisions": placed_decisions,
-    "log": placed_lines,
-}
-"""Table → the index of those of its rows that have a place."""
 _GUARD = "audit_no_delete"
-
-
-def age_of(table: str) -> Column[float]:
-    """The column by which the rows of a table age (Unix s)."""
-    at = _AGES_BY.get(table)
-    return cast(
-        "Column[float]", tables.metadata.tables[table].c.at if at is None else at
-    )
 
 
 def purge_piece(connection: Connection, step: PurgeStep, before: float) -> int:
@@ -115,11 +67,11 @@ def purge_piece(connection: Connection, step: PurgeStep, before: float) -> int:
     Returns:
         Number of rows that it changed; fewer than a piece: nothing is left to do.
     """
-    table, at = tables.metadata.tables[step.table], age_of(step.table)
+    table, at = metadata.tables[step.table], AGES[step.table]
     dialect = connection.dialect.name
     which = _OVER.get(step.table, true())
     if step.kind == "positions":
-        which = _PLACED[step.table].dialect_options[dialect]["where"]
+        which = tables.PLACED[step.table].dialect_options[dialect]["where"]
     due = and_(at < before, which)
     last = select(at).where(due).order_by(at).offset(PIECE - 1).limit(1)
     until = connection.scalar(last)
@@ -173,7 +125,7 @@ def _pruned(column: str, members: tuple[str, ...], dialect: str) -> TextClause:
 def lost_of(
     connection: Connection, since: float, until: float
 ) -> tuple[Literal["places", "telemetry"], ...]:
-    """What is no longer kept of ``since <= at < until``, or of a part of it."""
+    """Kinds of rows no longer kept of ``since <= at < until``, or of a part of it."""
     d, s = detections.c, decisions.c
     decided = and_(s.started_at >= since, s.started_at < until)
     # A decision was about somebody, and its robot drove.
@@ -204,10 +156,6 @@ def recorded_days(connection: Connection, most: int) -> tuple[int, ...]:
     return tuple(days)
 
 
-async def _no_recording() -> bool:
-    return False
-
-
 class RecordedHistory:
     """Implements ``pipeline.retention.RetainedHistory``.
 
@@ -215,8 +163,8 @@ class RecordedHistory:
         recorder: The one writer.
         queries: Its reading side.
         directory: Of the data, whose disk is watched.
-        read_space: Room on the disk of a directory.
         drop_recording: Deletes the oldest recording of inputs, if there is one.
+        read_space: Room on the disk of a directory.
     """
 
     def __init__(
@@ -224,8 +172,8 @@ class RecordedHistory:
         recorder: Recorder,
         queries: Queries,
         directory: Path,
+        drop_recording: Callable[[], Coroutine[object, object, bool]],
         read_space: Callable[[Path], DiskSpace] = disk_space,
-        drop_recording: Callable[[], Coroutine[object, object, bool]] = _no_recording,
     ) -> None:
         self._recorder = recorder
         self._directory = directory
@@ -245,3 +193,108 @@ class RecordedHistory:
             return await asyncio.to_thread(self._read_space, self._directory)
         except OSError as error:
             raise HopError("disk", error.strerror or str(error)) from error
+
+
+# --- size ----
+
+_MINUTE_S, _HOUR_S = 60.0, 3600.0
+_PAGES_OF = """
+SELECT m.tbl_name, sum(d.pgsize) FROM dbstat AS d JOIN sqlite_master AS m USING (name)
+WHERE d.aggregate = TRUE GROUP BY m.tbl_name
+"""
+_SIZE_OF = text(
+    "SELECT sum(pg_total_relation_size(one)) FROM ("
+    "SELECT to_regclass(:name)::oid "
+    "UNION SELECT relid FROM pg_partition_tree(to_regclass(:name))) AS parts (one)"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class TableStats:
+    """Size of one table with its indexes.
+
+    Attributes:
+        size: (bytes); where SQLite does not say, the table's share of all rows.
+        oldest: (Unix s); None of an empty table, as ``newest``.
+        hourly: Bytes for each hour of each robot, of rows since the oldest odometry;
+            None without any.
+    """
+
+    name: str
+    rows: int
+    size: int
+    oldest: float | None
+    newest: float | None
+    hourly: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class HistoryStats:
+    """Size of the history.
+
+    Attributes:
+        tables: The largest first.
+        robot_hours: Hours in which odometry of a robot came, of all robots.
+    """
+
+    tables: tuple[TableStats, ...]
+    robot_hours: float
+
+
+def read_stats(connection: Connection) -> HistoryStats:
+    """Measure the history; reads all of it."""
+    counted = {one: _count(connection, one) for one in metadata.sorted_tables}
+    sizes = _sizes(connection, {one.name: n for one, n in counted.items()})
+    hours = _robot_hours(connection)
+    since = connection.scalar(select(func.min(odometry.c.at)))
+    found = [
+        _stats(connection, table, rows, sizes.get(table.name, 0), since, hours)
+        for table, rows in counted.items()
+    ]
+    return HistoryStats(tuple(sorted(found, key=lambda one: -one.size)), hours)
+
+
+def _count(connection: Connection, table: Table) -> int:
+    return connection.scalar(select(func.count()).select_from(table)) or 0
+
+
+def _stats(
+    connection: Connection,
+    table: Table,
+    rows: int,
+    size: int,
+    since: float | None,
+    hours: float,
+) -> TableStats:
+    at = AGES[table.name]
+    oldest, newest = (
+        connection.scalar(select(one(at))) for one in (func.min, func.max)
+    )
+    hourly = None
+    if hours and rows:
+        recent = connection.scalar(select(func.count()).where(at >= since)) or 0
+        hourly = size / rows * recent / hours
+    return TableStats(table.name, rows, size, oldest, newest, hourly)
+
+
+def _robot_hours(connection: Connection) -> float:
+    # Rounded, not cut, on PostgreSQL: still one for each minute.
+    minute = cast(odometry.c.at / _MINUTE_S, Integer)
+    each = select(odometry.c.robot_id, minute).distinct().subquery()
+    minutes = connection.scalar(select(func.count()).select_from(each)) or 0
+    return minutes * _MINUTE_S / _HOUR_S
+
+
+def _sizes(connection: Connection, rows: dict[str, int]) -> dict[str, int]:
+    if connection.dialect.name == "postgresql":
+        return {n: int(connection.scalar(_SIZE_OF, {"name": n}) or 0) for n in rows}
+    try:
+        return {row[0]: row[1] for row in connection.execute(text(_PAGES_OF))}
+    except OperationalError:
+        # Some builds of SQLite have no size of each table.
+        pages, page = (
+            connection.exec_driver_sql(f"PRAGMA {one}").scalar() or 0
+            for one in ("page_count", "page_size")
+        )
+        total = max(1, sum(rows.values()))
+        return {name: int(pages) * int(page) * n // total for name, n in rows.items()}

@@ -46,7 +46,7 @@ class RecordingDirectory:
         file.path.rename(file.path.with_suffix(""))
 
     def left_open(self) -> Sequence[Path]:
-        """What a crash left; ask before a recording begins."""
+        """Files that a crash left open; ask before a recording begins."""
         return sorted(self.path.glob("*" + _OPEN))
 
     def files(self) -> Sequence[RecordingFile]:
@@ -59,10 +59,6 @@ class RecordingDirectory:
             found.append(RecordingFile(name, status.st_size, is_open, status.st_mtime))
         return found
 
-    def has_finished(self) -> bool:
-        """Whether any is finished."""
-        return self.oldest() is not None
-
     def prune(self) -> int:
         """Delete what is over the limits; how many files."""
         gone = superfluous(self.files(), self._limits)
@@ -72,9 +68,8 @@ class RecordingDirectory:
 
     def oldest(self) -> Path | None:
         """The oldest that is finished."""
-        finished = (one.name for one in self.files() if not one.is_open)
-        name = next(finished, None)
-        return None if name is None else self.path / name
+        finished = (self.path / one.name for one in self.files() if not one.is_open)
+        return next(finished, None)
 
     def finished(self, name: str) -> Path | None:
         """The file of a finished recording; None where there is none of this name."""

@@ -1,12 +1,13 @@
-"""What viewers such as Foxglove draw of the messages that came in, thinned.
+"""Messages for viewers such as Foxglove, made of those that came in, thinned.
 
-Names and fields of the schemas: https://docs.foxglove.dev/docs/sdk/schemas.  Frames are
-``map`` and ``{robot}/base_link``.
+``foxglove.json`` has the schemas (https://docs.foxglove.dev/docs/sdk/schemas).  Frames
+are ``map`` and ``{robot}/base_link``.
 """
 
 import contextlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from importlib.resources import files
 from typing import Any
 
 import orjson
@@ -29,114 +30,54 @@ from iveg.domain.observations import (
 )
 from iveg.ngsi.codec import read_notification
 
-# --- schemas ----------------------------------------------------------------------
-
-_NUMBER, _TEXT, _FLAG = {"type": "number"}, {"type": "string"}, {"type": "boolean"}
-
-
-def _object(**properties: object) -> dict[str, object]:
-    return {"type": "object", "properties": properties}
-
-
-def _list(of: object) -> dict[str, object]:
-    return {"type": "array", "items": of}
-
-
-_TIME = _object(sec={"type": "integer"}, nsec={"type": "integer"})
-_VECTOR = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER)
-_QUATERNION = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
-_POSE = _object(position=_VECTOR, orientation=_QUATERNION)
-_COLOUR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
-POSE_IN_FRAME = _object(timestamp=_TIME, frame_id=_TEXT, pose=_POSE)
-TRANSFORM = _object(
-    timestamp=_TIME,
-    parent_frame_id=_TEXT,
-    child_frame_id=_TEXT,
-    translation=_VECTOR,
-    rotation=_QUATERNION,
-)
-SCAN = _object(
-    timestamp=_TIME,
-    frame_id=_TEXT,
-    pose=_POSE,
-    start_angle=_NUMBER,
-    end_angle=_NUMBER,
-    ranges=_list(_NUMBER),
-    intensities=_list(_NUMBER),
-)
-_CUBE = _object(pose=_POSE, size=_VECTOR, color=_COLOUR)
-_ENTITY = _object(
-    timestamp=_TIME,
-    frame_id=_TEXT,
-    id=_TEXT,
-    lifetime=_TIME,
-    frame_locked=_FLAG,
-    metadata=_list(_object(key=_TEXT, value=_TEXT)),
-    cubes=_list(_CUBE),
-)
-SCENE = _object(deletions=_list(_object()), entities=_list(_ENTITY))
-
-
-# --- messages ---------------------------------------------------------------------
-
 Told = tuple[Channel, Mapping[str, Any]]
 """A message and its channel."""
-
+_SCHEMAS = orjson.loads((files(__package__) / "foxglove.json").read_bytes())
 _MAP, _BASE = "map", "base_link"
 _SHOWN_S = 1.0
 """How long a box is drawn; the next picture takes its place before that."""
 
 
-_TRANSFORMS = Channel("/tf", "foxglove.FrameTransform", TRANSFORM)
-
-
-def _pose_channel(robot_id: str) -> Channel:
-    return Channel(f"/{robot_id}/pose", "foxglove.PoseInFrame", POSE_IN_FRAME)
-
-
-def _scan_channel(robot_id: str) -> Channel:
-    return Channel(f"/{robot_id}/scan", "foxglove.LaserScan", SCAN)
-
-
-def _scene_channel(robot_id: str) -> Channel:
-    return Channel(f"/{robot_id}/detections", "foxglove.SceneUpdate", SCENE)
+def _channel(topic: str, schema: str) -> Channel:
+    return Channel(topic, f"foxglove.{schema}", _SCHEMAS[f"foxglove.{schema}"])
 
 
 def messages_of(observation: Observation, wall: float) -> Iterator[Told]:
-    """What viewers draw of an observation that came at ``wall`` (Unix s)."""
+    """Messages for viewers, of an observation that came at ``wall`` (Unix s)."""
     at, robot_id = _time(wall), observation.robot_id
     base = f"{robot_id}/{_BASE}"
     match observation:
         case Odometry(pose=pose):
-            yield _pose(robot_id, at, pose)
-            yield _transform(base, at, pose)
+            placed = _as_pose(pose)
+            yield (
+                _channel(f"/{robot_id}/pose", "PoseInFrame"),
+                {"timestamp": at, "frame_id": _MAP, "pose": placed},
+            )
+            yield (
+                _channel("/tf", "FrameTransform"),
+                {
+                    "timestamp": at,
+                    "parent_frame_id": _MAP,
+                    "child_frame_id": base,
+                    "translation": placed["position"],
+                    "rotation": placed["orientation"],
+                },
+            )
         case LaserScan():
-            yield _scan(observation, base, at)
+            message = {"timestamp": at, "frame_id": base, **_scan(observation)}
+            yield _channel(f"/{robot_id}/scan", "LaserScan"), message
         case DetectionFrame():
-            yield _scene(observation, base, at)
+            entities = [
+                {"timestamp": at, "id": f"{robot_id}-{number}", **_entity(one, base)}
+                for number, one in enumerate(observation.detections)
+            ]
+            message = {"deletions": [], "entities": entities}
+            yield _channel(f"/{robot_id}/detections", "SceneUpdate"), message
 
 
-def _pose(robot_id: str, at: Mapping[str, int], pose: Pose2D) -> Told:
-    message = {"timestamp": at, "frame_id": _MAP, "pose": _as_pose(pose)}
-    return _pose_channel(robot_id), message
-
-
-def _transform(base: str, at: Mapping[str, int], pose: Pose2D) -> Told:
-    placed = _as_pose(pose)
-    return _TRANSFORMS, {
-        "timestamp": at,
-        "parent_frame_id": _MAP,
-        "child_frame_id": base,
-        "translation": placed["position"],
-        "rotation": placed["orientation"],
-    }
-
-
-def _scan(scan: LaserScan, base: str, at: Mapping[str, int]) -> Told:
+def _scan(scan: LaserScan) -> Mapping[str, Any]:
     last = scan.angle_min + scan.angle_increment * max(0, scan.ranges.size - 1)
-    return _scan_channel(scan.robot_id), {
-        "timestamp": at,
-        "frame_id": base,
+    return {
         "pose": _as_pose(scan.mount),
         "start_angle": scan.angle_min,
         "end_angle": last,
@@ -145,20 +86,9 @@ def _scan(scan: LaserScan, base: str, at: Mapping[str, int]) -> Told:
     }
 
 
-def _scene(frame: DetectionFrame, base: str, at: Mapping[str, int]) -> Told:
-    entities = [
-        _entity(f"{frame.robot_id}-{number}", one, base, at)
-        for number, one in enumerate(frame.detections)
-    ]
-    return _scene_channel(frame.robot_id), {"deletions": [], "entities": entities}
-
-
-def _entity(
-    name: str, seen: Detection, base: str, at: Mapping[str, int]
-) -> Mapping[str, Any]:
+def _entity(seen: Detection, base: str) -> Mapping[str, Any]:
     box = seen.box
     size = box.xmax - box.xmin, box.ymax - box.ymin, box.zmax - box.zmin
-    frame = _MAP if seen.frame_id == _MAP else base
     cube = {
         "pose": {"position": _vector(*box.centre), "orientation": _turn(0.0)},
         "size": _vector(*size),
@@ -166,9 +96,7 @@ def _entity(
     }
     facts = {"class": seen.class_id, "confidence": f"{seen.probability:.3f}"}
     return {
-        "timestamp": at,
-        "frame_id": frame,
-        "id": name,
+        "frame_id": _MAP if seen.frame_id == _MAP else base,
         "lifetime": _time(_SHOWN_S),
         "frame_locked": True,
         "metadata": [{"key": key, "value": value} for key, value in facts.items()],

@@ -1,14 +1,15 @@
-"""What a recording holds, and its way to the process that writes it.
+"""Inputs of a recording, and their way to the process that writes them.
 
-An input is a head of fixed size, a name and a payload, so that the loop packs it in a
-microsecond and nothing is read before it is in the other process.
+An input is a line of JSON and a payload, so that the loop packs it in a microsecond and
+nothing is read before it is in the other process.
 """
 
 import re
-import struct
 from collections.abc import Iterator, Sequence
 from enum import IntEnum
-from typing import Final, NamedTuple
+from typing import BinaryIO, Final, NamedTuple
+
+import orjson
 
 from iveg.adapters.recordings.mcap_file import Channel
 from iveg.domain.observations import Instant, LaserScan, Observation, Overtaken
@@ -21,12 +22,10 @@ WHOLE, CHANGED = b'{"whole":true,', b'{"whole":false,'
 """How a picture begins."""
 _NUMBERS = re.compile(rb"\[[-+.,\deE\snul]{100,}\]")
 """A long list of numbers in JSON."""
-_HEAD = struct.Struct("<BddHI")
-"""Sort, both clocks (s), bytes of the name and of the payload."""
 
 
 class Sort(IntEnum):
-    """What came in; what its name says."""
+    """Sort of an input, which says what its name is."""
 
     MEASURE = 1
     """A message of MQTT: its topic."""
@@ -60,9 +59,8 @@ class Incoming(NamedTuple):
 
 def pack(sort: Sort, at: Instant, name: str = "", payload: bytes = b"") -> bytes:
     """An input as bytes."""
-    encoded = name.encode()
-    head = _HEAD.pack(sort, at.mono, at.wall, len(encoded), len(payload))
-    return b"".join((head, encoded, payload))
+    head = orjson.dumps([sort, at.mono, at.wall, name, len(payload)])
+    return b"".join((head, b"\n", payload))
 
 
 def worth_keeping(body: bytes, observed: Sequence[Observation]) -> bytes:
@@ -77,32 +75,10 @@ def worth_keeping(body: bytes, observed: Sequence[Observation]) -> bytes:
     return _NUMBERS.sub(b"[]", body) if are_twins else body
 
 
-class Unpacking:
-    """Inputs from a stream of bytes, in whichever pieces they come."""
-
-    def __init__(self) -> None:
-        self._left = b""
-
-    def feed(self, piece: bytes) -> Iterator[Incoming]:
-        """The inputs that are whole by now; to be used up before the next piece."""
-        whole = self._left + piece if self._left else piece
-        begins = 0
-        while (found := _unpack(whole, begins)) is not None:
-            one, begins = found
-            yield one
-        self._left = whole[begins:]
-
-
-def _unpack(whole: bytes, begins: int) -> tuple[Incoming, int] | None:
-    """The input that begins here, and where the next does; None: not all is there."""
-    named = begins + _HEAD.size
-    if named > len(whole):
-        return None
-    sort, mono, wall, name_size, size = _HEAD.unpack_from(whole, begins)
-    payload_at = named + name_size
-    ends = payload_at + size
-    if ends > len(whole):
-        return None
-    name = whole[named:payload_at].decode()
-    at = Instant(mono, wall)
-    return Incoming(Sort(sort), at, name, whole[payload_at:ends]), ends
+def unpack(stream: BinaryIO) -> Iterator[Incoming]:
+    """Inputs of a stream until it ends; one that is cut short is left out."""
+    while (head := stream.readline()).endswith(b"\n"):
+        sort, mono, wall, name, size = orjson.loads(head)
+        payload = stream.read(size)
+        if len(payload) == size:
+            yield Incoming(Sort(sort), Instant(mono, wall), name, payload)

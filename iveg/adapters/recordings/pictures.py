@@ -18,7 +18,7 @@ from mcap.stream_reader import StreamReader
 
 from iveg.adapters.recordings.directory import NAME
 from iveg.adapters.recordings.incoming import CHANGED, WHOLE, WHOLE_S
-from iveg.adapters.recordings.reading import BROKEN, LONGEST_RECORD, unpack
+from iveg.adapters.recordings.mcap_file import BROKEN, LONGEST_RECORD, unpack
 from iveg.adapters.recordings.writer import PICTURES_S
 from iveg.domain.errors import HopError, NotRecordedError
 
@@ -66,7 +66,7 @@ class _Place(NamedTuple):
 
 @dataclass(slots=True)
 class _File:
-    """What is known of one file, which may grow."""
+    """Chunks of one file, which may grow."""
 
     chunks: list[_Place] = field(default_factory=list)
     behind: int = 0
@@ -139,7 +139,7 @@ class PictureFiles:
         """By name and inode, which a file keeps when it is finished."""
 
     def by(self, wall: float) -> Pictures:
-        """What leads to the picture of a moment (Unix s).
+        """Pictures that lead to that of a moment (Unix s).
 
         Where the wall clock was set back, two files have the same moments: the one
         that began at the later time counts.
@@ -207,7 +207,7 @@ def _records(stream: object, *, is_inside: bool) -> Iterable[object]:
 
 
 def _stem(wall: float) -> str:
-    """How the file of a moment (Unix s) would be named."""
+    """Name that the file of a moment (Unix s) would have."""
     return datetime.fromtimestamp(wall, UTC).strftime(NAME)
 
 

@@ -6,21 +6,21 @@ What ails the disk is said once, and ends it.
 """
 
 import contextlib
-import os
 import signal
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, Final
 
 import orjson
+from pydantic import TypeAdapter
 
 from iveg.adapters import clock
 from iveg.adapters.files import disk_space, give_way
 from iveg.adapters.recordings.directory import RecordingDirectory
 from iveg.adapters.recordings.foxglove import Drawing
-from iveg.adapters.recordings.incoming import WHOLE, Incoming, Sort, Unpacking
+from iveg.adapters.recordings.incoming import WHOLE, Incoming, Sort, unpack
 from iveg.adapters.recordings.mcap_file import Channel, McapFile
 from iveg.domain.observations import Instant
 from iveg.domain.recordings import RecordingLimits
@@ -34,12 +34,11 @@ CLOCK_SET_S, SHORTEST_S = 1.0, 10.0
 INPUTS_S: Final = 3600.0
 PICTURES_S: Final = 300.0
 """Length of a file; short where the one that is written is looked through."""
-_PIECE = 1 << 18
 
 
 @dataclass(frozen=True)
 class WriterSetup:
-    """What a writer is told at its beginning.
+    """Setup of a writer, told at its beginning.
 
     Attributes:
         folder: Of the recordings of inputs; pictures are in a folder of it.
@@ -54,18 +53,6 @@ class WriterSetup:
     apikey: str = "iveg"
     robots: Sequence[str] = ()
 
-    def line(self) -> bytes:
-        """For the writer's standard input."""
-        return orjson.dumps({**asdict(self), "folder": str(self.folder)}) + b"\n"
-
-    @classmethod
-    def of_line(cls, line: bytes) -> "WriterSetup":
-        """What ``line`` was told."""
-        setup = orjson.loads(line)
-        for name in ("limits", "pictures"):
-            setup[name] = RecordingLimits(**setup[name])
-        return cls(**{**setup, "folder": Path(setup["folder"])})
-
     @property
     def room(self) -> int:
         """Bytes that a disk must have for recordings: twice as many as they may take.
@@ -76,11 +63,15 @@ class WriterSetup:
         return 2 * sum(one or RecordingLimits.most_bytes for one in kept)
 
     def directories(self) -> tuple[RecordingDirectory, RecordingDirectory]:
-        """Of inputs, and of pictures."""
+        """Directories of inputs and of pictures."""
         return (
             RecordingDirectory(self.folder, self.limits),
             RecordingDirectory(self.folder / "pictures", self.pictures),
         )
+
+
+SETUP: Final = TypeAdapter(WriterSetup)
+"""Writes it for the writer's standard input, and reads it there."""
 
 
 class _Series:
@@ -146,6 +137,7 @@ class RecordingWriter:
         inputs, pictures = setup.directories()
         self._inputs = _Series(inputs, INPUTS_S)
         self._pictures = _Series(pictures, PICTURES_S)
+        self._all = self._inputs, self._pictures
         self._read_space = read_space
         self._drawing = Drawing(setup.apikey, setup.robots)
         self._open = 0
@@ -181,8 +173,7 @@ class RecordingWriter:
         came: Incoming,
         drawn: Iterable[tuple[Channel, bytes]] = (),
     ) -> None:
-        file.add(came.channel, came.at, came.payload)
-        for channel, payload in drawn:
+        for channel, payload in ((came.channel, came.payload), *drawn):
             file.add(channel, came.at, payload)
         self._open += 1
 
@@ -205,20 +196,20 @@ class RecordingWriter:
         """
         if now - self._pruned_at >= PRUNE_S:
             self._pruned_at = now
-            for series in (self._inputs, self._pictures):
+            for series in self._all:
                 series.directory.prune()
             self._look_at_disk()
         if now - self._settled_at < SETTLE_S:
             return False
         self._settled_at = now
-        for series in (self._inputs, self._pictures):
+        for series in self._all:
             series.settle()
         self._settled()
         return True
 
     def finish(self) -> None:
         """Finish the files."""
-        for series in (self._inputs, self._pictures):
+        for series in self._all:
             series.finish()
         self._settled()
 
@@ -231,11 +222,10 @@ class RecordingWriter:
         The files are finished, so that the disk's guard may delete them
         (``retention``).
         """
-        directories = self._inputs.directory, self._pictures.directory
-        directories[0].path.mkdir(parents=True, exist_ok=True)
-        space = self._read_space(directories[0].path)
-        is_low = space.is_low(was_low=self._is_held)
-        has_older = any(one.has_finished() for one in directories)
+        folder = self._inputs.directory.path
+        folder.mkdir(parents=True, exist_ok=True)
+        is_low = self._read_space(folder).is_low(was_low=self._is_held)
+        has_older = any(one.directory.oldest() for one in self._all)
         self._is_held = is_low and (self._is_held or not has_older)
         if self._is_held:
             self.finish()
@@ -246,11 +236,9 @@ class RecordingWriter:
 
 def serve(source: BinaryIO, answers: BinaryIO) -> None:
     """Write until the source ends.  Raises OSError: the disk refuses."""
-    writer = RecordingWriter(WriterSetup.of_line(source.readline()))
-    unpacking = Unpacking()
-    while piece := os.read(source.fileno(), _PIECE):
-        for came in unpacking.feed(piece):
-            writer.write_input(came)
+    writer = RecordingWriter(SETUP.validate_json(source.readline()))
+    for came in unpack(source):
+        writer.write_input(came)
         if writer.keep_house(clock.mono()):
             _answer(answers, {"written": writer.kept, "dropped": writer.dropped})
     writer.finish()
@@ -270,7 +258,7 @@ def main() -> None:
     # Where the machine is overloaded is what somebody will want to see again.
     give_way(0)
     with (
-        open(0, "rb", buffering=0) as source,
+        open(0, "rb") as source,
         open(1, "wb", buffering=0) as answers,
     ):
         try:

@@ -12,6 +12,7 @@ from typing import Literal
 
 from iveg.domain.observations import Instant
 from iveg.domain.records import CommandRecord
+from iveg.domain.stamps import wall_of
 from iveg.domain.transports import Transport, TransportId
 
 State = Literal[
@@ -203,6 +204,26 @@ _OF_GOALS: Mapping[str, Outcome] = {
     "DELETED": "deleted",
 }
 LOUD = frozenset({"UNCONFIRMED", "STILL_MOVING"})
+
+
+def write_command(command: FollowedCommand) -> CommandRecord:
+    """A command as a row; moments are Unix seconds."""
+    times = command.times
+    return CommandRecord(
+        command_id=command.command_id,
+        robot_id=command.robot_id,
+        kind=command.kind,
+        state=command.state,
+        requested_by=command.requesters[0],
+        requested_at=times.requested.wall,
+        sent_at={one: at.wall for one, at in times.sent.items()},
+        answer_at={one: at.wall for one, at in times.answered.items()},
+        standing_at=wall_of(times.standing),
+        standstill_ms=command.standstill_ms,
+        tries=command.tries,
+        reason=command.reason,
+        pressed_at=times.pressed,
+    )
 
 
 def outcome_of(record: CommandRecord) -> Outcome:

@@ -11,8 +11,7 @@ from typing import IO, Annotated, Literal, get_args
 from pydantic import Field, TypeAdapter, ValidationError
 
 from iveg.adapters.recordings.incoming import NOTIFICATIONS
-from iveg.adapters.recordings.mcap_file import Channel
-from iveg.adapters.recordings.reading import is_own, read_messages
+from iveg.adapters.recordings.mcap_file import Channel, is_own, read_messages
 from iveg.domain.errors import DataFileError, UnreadableError
 from iveg.domain.geometry import Pose2D, Twist2D, box_of_a_person
 from iveg.domain.observations import (

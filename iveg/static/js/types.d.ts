@@ -12,18 +12,29 @@ export type Acting = {
 
 /** An alert to people: all occurrences of one kind and subject as one. */
 export type Alert = {
-  alert_id: string;
-  priority: "P1" | "P2" | "P3";
-  key: string;
+  /** Values of its sentence. */
   slots: Record<string, string | boolean | number | null>;
-  robot_id: string | null;
-  /** The first time; ``last_raised_at`` the newest. */
+  /** The alert. */
+  alert_id: string;
+  /** The gravest of what holds and of what nobody has acknowledged. */
+  priority: "P1" | "P2" | "P3";
+  /** Template of its sentence; `slots` fill it. */
+  key: string;
+  /** The first time. */
   raised_at: string;
+  /** The newest time. */
   last_raised_at: string;
+  /** The robot, if it is about one. */
+  robot_id: string | null;
+  /** It was over; none: it is not. */
   cleared_at: string | null;
+  /** A person took note. */
   acknowledged_at: string | null;
+  /** Who took note. */
   acknowledged_by: string | null;
+  /** What they wrote. */
   note: string | null;
+  /** How often it was raised while it lived. */
   count: number;
 };
 
@@ -55,17 +66,26 @@ export type Area = {
   ymax: number;
 };
 
-/** One row. */
+/** One row of the audit. */
 export type AuditEntry = {
-  audit_id: string;
-  at: string;
-  person: string;
-  name: string;
-  role: string;
-  method: string;
-  action: string;
-  subject: string;
+  /** ``status`` of the answer, and what was asked; of a rule ``version_seen`` and the new ``version``. */
   details: Record<string, JsonValue>;
+  /** The row; one offered twice is stored once. */
+  audit_id: string;
+  /** It happened. */
+  at: string;
+  /** Id of the account. */
+  person: string;
+  /** Name of the account, as it was then. */
+  name: string;
+  /** Their role then. */
+  role: string;
+  /** Way of signing in. */
+  method: string;
+  /** What they did, such as `stop` or `sign_in_refused`. */
+  action: string;
+  /** To what, such as a robot's id; may be empty. */
+  subject: string;
 };
 
 /** The battery, as the robot said last. */
@@ -104,23 +124,9 @@ export type ClimateReading = {
 
 /** One STOP, release, resume or goal. */
 export type Command = {
-  command_id: string;
-  robot_id: string;
-  kind: "stop" | "release" | "resume" | "goal";
-  state: string;
-  requested_by: string;
   times: CommandTimes;
-  /** As in ``times``, under the name of the CSV; so the six below. */
-  pressed_at: string | null;
-  requested_at: string;
-  sent_fiware_at: string | null;
-  sent_direct_at: string | null;
-  answer_fiware_at: string | null;
-  answer_direct_at: string | null;
-  standing_at: string | null;
+  /** First standing sample less the press; null while unknown (ms). */
   standstill_ms: number | null;
-  tries: number;
-  reason: string | null;
   requesters: string[];
   hold_id: string | null;
   pressed_doubted: boolean;
@@ -137,6 +143,34 @@ export type Command = {
   goal: CommandGoal | null;
   /** Steps of the audit trail; empty on ``/live``, which reports each step itself. */
   steps: CommandStep[];
+  /** The order (ULID). */
+  command_id: string;
+  /** The robot. */
+  robot_id: string;
+  /** What was asked. */
+  kind: "stop" | "release" | "resume" | "goal";
+  /** One of the nine states of STOP, `RUNNING`, `REPLACED` or `EXPIRED`. */
+  state: string;
+  /** Who asked first. */
+  requested_by: string;
+  /** iVeg took the order. */
+  requested_at: string;
+  /** This transport first took it. */
+  sent_fiware_at: string | null;
+  /** This transport first took it. */
+  sent_direct_at: string | null;
+  /** The robot first said by it that it has it. */
+  answer_fiware_at: string | null;
+  /** The robot first said by it that it has it. */
+  answer_direct_at: string | null;
+  /** First sample at rest. */
+  standing_at: string | null;
+  /** How often it was sent; all transports at once count once. */
+  tries: number;
+  /** Why, as a code (docs/interfaces). */
+  reason: string | null;
+  /** A finger pressed. */
+  pressed_at: string | null;
 };
 
 /** Where a goal sends a robot, in ``map`` (m). */
@@ -215,42 +249,62 @@ export type Coverage = {
 
 /** One decision: detection, observer, rule, and the robot's reaction. */
 export type Decision = {
-  decision_id: string;
-  kind: "alert" | "mandate";
-  robot_id: string;
-  person_id: string | null;
-  observer: string | null;
-  class: string | null;
-  class_id: string | null;
-  confidence: number | null;
   position: Position | null;
-  /** As in ``position``, under the name of the CSV; so ``y``, ``z``. */
-  x: number | null;
-  y: number | null;
-  z: number | null;
-  /** From the robot to the centre of the ring. */
-  distance_m: number | null;
-  speed_factor: number | null;
-  reason: string | null;
   rule: DecisionRule;
-  /** As in ``rule``, under the name of the CSV; so the two below. */
-  rule_id: string | null;
-  rule_version: string | null;
-  /** With ``places``, as they are stored. */
-  rule_parameters: JsonValue;
-  in_sight: boolean | null;
-  started_at: string;
-  feedback_at: string | null;
-  applied_at: string | null;
-  observed_at: string | null;
-  ended_at: string | null;
-  /** m/s, measured at ``started_at``. */
-  speed_before: number | null;
-  speed_after: number | null;
   links: DecisionLink[];
   sentence: Sentence;
   /** Poses of the robot and its observer; empty for those of the earlier version. */
   places: DecisionPlace[];
+  /** The decision (ULID). */
+  decision_id: string;
+  /** `alert` (somebody was confirmed) or `mandate` (a speed limit). */
+  kind: "alert" | "mandate";
+  /** Robot that was limited, or saw. */
+  robot_id: string;
+  /** The rule fired. */
+  started_at: string;
+  /** The track. */
+  person_id: string | null;
+  /** Robot that saw it. */
+  observer: string | null;
+  /** Canonical class; none: unknown to the table of classes. */
+  class: string | null;
+  /** Class as the detector said. */
+  class_id: string | null;
+  /** Confidence of the detection (0 to 1). */
+  confidence: number | null;
+  /** Place of what was seen or judged; none where it is no longer kept (m). */
+  x: number | null;
+  /** Place of what was seen or judged; none where it is no longer kept (m). */
+  y: number | null;
+  /** Place of what was seen or judged; none where it is no longer kept (m). */
+  z: number | null;
+  /** From the robot to the centre of the zone (m). */
+  distance_m: number | null;
+  /** The limit (0, 0.5 or 1). */
+  speed_factor: number | null;
+  /** Why, as a code (docs/interfaces). */
+  reason: string | null;
+  /** The rule. */
+  rule_id: string | null;
+  /** Its version. */
+  rule_version: string | null;
+  /** Its parameters at that moment, with `places`. */
+  rule_parameters: Record<string, unknown>;
+  /** Whether the robot itself could see the cause. */
+  in_sight: boolean | null;
+  /** The feedback left. */
+  feedback_at: string | null;
+  /** The robot reported the factor. */
+  applied_at: string | null;
+  /** The speed had come down. */
+  observed_at: string | null;
+  /** The rule let go; none: not yet. */
+  ended_at: string | null;
+  /** Speed measured at `started_at` (m/s). */
+  speed_before: number | null;
+  /** Speed at `observed_at` (m/s). */
+  speed_after: number | null;
 };
 
 /** One link of the chain of evidence. */
@@ -278,21 +332,28 @@ export type DecisionRule = {
 
 /** One box of one detection frame, placed in ``map``. */
 export type Detection = {
-  robot_id: string;
-  stamp: string | null;
   /** When it reached iVeg; null on ``/live``, where its frame has an age. */
   received_at: string | null;
-  class: string | null;
-  class_id: string;
-  probability: number;
   position: Position;
   box: DetectionBox | null;
-  confident: boolean;
-  person_id: string | null;
   /** The robot of the fleet that was seen. */
   peer: string | null;
-  /** Transport of the copy that was first. */
+  /** The robot. */
+  robot_id: string;
+  /** Class as the detector said. */
+  class_id: string;
+  /** Confidence of the detection (0 to 1). */
+  probability: number;
+  /** Whether it reached the threshold of the rule in force. */
+  confident: boolean;
+  /** Transport whose copy was first: `direct` or `fiware`. */
   transport: string;
+  /** Time of the picture as the robot sent it. */
+  stamp: string | null;
+  /** Canonical class; none: unknown to the table of classes. */
+  class: string | null;
+  /** The track. */
+  person_id: string | null;
 };
 
 /** A 3D box (m) in ``frame_id``. */
@@ -326,7 +387,7 @@ export type Detector = {
   out_reason: string | null;
 };
 
-/** What one version of the rule did over a range. */
+/** Deeds of one version of the rule over a range. */
 export type Doings = {
   /** Reason → seconds of a robot at half speed. */
   slowed_s: Record<string, number>;
@@ -508,13 +569,21 @@ export type LatencyTable = {
 
 /** One line of the action and inference log. */
 export type LogEntry = {
-  id: number;
-  at: string;
-  kind: string;
-  robot_id: string | null;
-  key: string;
+  /** Values of its sentence. */
   slots: Record<string, string | boolean | number | null>;
+  /** Number of the line in the live log; it rises. */
+  id: number;
+  /** It happened. */
+  at: string;
+  /** `detection`, `speed`, `command`, `link`, `alert` or `system`. */
+  kind: string;
+  /** Template of its sentence; `slots` fill it. */
+  key: string;
+  /** The robot, if it is about one. */
+  robot_id: string | null;
+  /** Canonical class; none: unknown to the table of classes. */
   class: string | null;
+  /** The decision behind it. */
   decision_id: string | null;
 };
 
@@ -645,7 +714,7 @@ export type Person = {
   class_id: string;
   stage: "seen" | "remembered" | "last_seen" | "gone";
   position: Position;
-  /** Radius of the widest ring. */
+  /** Radius of the widest zone. */
   radius_m: number | null;
   confidence: number;
   first_seen: string;
@@ -663,7 +732,7 @@ export type Person = {
   lane: string | null;
   acting: Acting[];
   margin: Margin | null;
-  /** The mark by which it is no person and has no ring. */
+  /** The mark by which it is no person and has no zone. */
   thing_id: string | null;
 };
 
@@ -724,12 +793,16 @@ export type ProgramToken = {
   over: boolean;
 };
 
-/** One reading: the sensor's own fields by name. */
+/** One reading: the sensor's own fields by name ([mqtt.md](mqtt.md)). */
 export type Reading = {
+  /** It reached iVeg. */
   at: string;
+  /** The robot. */
   robot_id: string;
+  /** The sensor, such as `battery`. */
   kind: string;
-  value: Record<string, JsonValue>;
+  /** Its quantities by name (docs/interfaces/mqtt.md). */
+  value: Record<string, unknown>;
 };
 
 /** One robot with the age of what is said of it. */
@@ -829,7 +902,7 @@ export type Scan = {
   points: [number, number][];
 };
 
-/** What a robot's laser sees near it and nothing explains, in ``map`` (m). */
+/** Obstacle that a robot's laser sees and nothing explains, in ``map`` (m). */
 export type SeenObstacle = {
   x: number;
   y: number;
@@ -918,7 +991,7 @@ export type SpeedLimit = {
   cause: string | null;
   distance_m: number | null;
   decision_id: string | null;
-  /** Until it reaches the ring of the cause; null: it is inside. */
+  /** Until it reaches the zone of the cause; null: it is inside. */
   foretold_s: number | null;
 };
 
@@ -955,7 +1028,7 @@ export type Tile = {
   place: TilePlace | null;
 };
 
-/** What people call it, by language. */
+/** Name of a tile, by language. */
 export type TileName = {
   es: string;
   en: string;

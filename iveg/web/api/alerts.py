@@ -16,8 +16,8 @@ from iveg.domain.errors import UnknownRobotError
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import Instant
 from iveg.domain.wire import clean_text, legible
-from iveg.models.alert import AcknowledgedAlerts, Alert, Note
 from iveg.models.base import Listing
+from iveg.models.history import AcknowledgedAlerts, Alert, Note
 from iveg.vital.evaluate import Evaluator
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
@@ -136,7 +136,7 @@ def notes_router(
         since, until = seconds(asked.since), seconds(asked.until)
         wanted = lists.Filter(since=since, until=until, limit=lists.MOST_ROWS)
         page = await queries.page(lists.NOTES, wanted)
-        return Json(Listing(items=[Note.of_record(one) for one in page.items]))
+        return Json(Listing(items=[Note.from_record(one) for one in page.items]))
 
     @routes.post("/notes", status_code=201, responses=refusals(404))
     async def write(body: NoteRequest, who: Operator) -> dict[str, str]:

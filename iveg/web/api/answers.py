@@ -29,7 +29,7 @@ class Apart(Protocol):
     async def run(
         self, work: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs
     ) -> _T:
-        """Result of a function of a module there.
+        """Run a function of a module there, and return its answer.
 
         Raises:
             HopError: it raised one, or could not be done.

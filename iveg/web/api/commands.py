@@ -41,7 +41,7 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
         """STOP one robot, on every transport at once."""
         press = await press_of(request)
         pressed = await commander.stop([robot_id], who.name, clock(), press)
-        return Json(Pressed.of(pressed[0]), 202)
+        return Json(Pressed.from_value(pressed[0]), 202)
 
     @routes.post(
         "/fleet/stop",
@@ -53,7 +53,9 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
         """STOP every robot, in parallel."""
         press = await press_of(request)
         pressed = await commander.stop(commander.machines, who.name, clock(), press)
-        return Json(FleetPressed(commands=[Pressed.of(one) for one in pressed]), 202)
+        return Json(
+            FleetPressed(commands=[Pressed.from_value(one) for one in pressed]), 202
+        )
 
     @routes.post(
         "/robots/{robot_id}/release",
@@ -64,7 +66,7 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
     async def release(robot_id: str, body: ReleaseRequest, who: Operator) -> Response:
         """Lift exactly the holds that the person saw; 409 when they have changed."""
         command = await commander.release(robot_id, body.holds, who.name, clock())
-        return Json(Pressed.of(command), 202)
+        return Json(Pressed.from_value(command), 202)
 
     @routes.post(
         "/robots/{robot_id}/resume",
@@ -75,6 +77,6 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
     async def resume(robot_id: str, who: Operator) -> Response:
         """Let a released robot drive again."""
         command = await commander.resume(robot_id, who.name, clock())
-        return Json(Pressed.of(command), 202)
+        return Json(Pressed.from_value(command), 202)
 
     return routes

@@ -1,9 +1,4 @@
-"""The evening sheet over HTTP: as numbers, and as a page to print.
-
-Figures of the history over HTTP, and the library that draws them.
-
-Latency of STOP (docs/interfaces/http.md), read from the history.
-"""
+"""Summaries of the history over HTTP: figures, latency of STOP, the evening sheet."""
 
 import asyncio
 from collections import defaultdict
@@ -44,10 +39,10 @@ from iveg.domain.observations import Instant
 from iveg.domain.records import ByTransport, CommandRecord, DecisionRecord
 from iveg.domain.stamps import format_stamp
 from iveg.domain.transports import TRANSPORTS, TransportId
-from iveg.models.base import GreenhouseMap, Point, rounded, write_json
+from iveg.models.base import GreenhouseMap, Point, write_json
 from iveg.models.command import Command, Latency, LatencySpread, RobotLatency
-from iveg.models.day import Day, Encounters, Pass, Slowed, Worked
-from iveg.models.equipment import ClimateReading
+from iveg.models.history import Day, Encounters, Pass, Slowed, Worked
+from iveg.models.snapshot import ClimateReading
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES
@@ -60,6 +55,11 @@ from iveg.web.security.requirements import refusals, require
 
 _DAY_S = 86_400.0
 _FOR_GOOD = "public, max-age=31536000, immutable"
+_FIGURES: dict[str, Any] = {
+    "response_class": Response,
+    "responses": {200: {"content": {"application/json": {}}}},
+}
+"""Said of each route of figures."""
 
 
 def add_routes(
@@ -77,8 +77,7 @@ def add_routes(
         summary="Plotly figures of a range",
         description="Speed with the speed limit, detections by class and "
         "confidence, how long each STOP took; the last 15 minutes unless told.",
-        response_class=Response,
-        responses={200: {"content": {"application/json": {}}}},
+        **_FIGURES,
     )
     async def draw(asked: Annotated[Range, Query()]) -> Response:
         since, until = range_of(asked, read_clock().wall)
@@ -98,21 +97,12 @@ def add_routes(
         headers = {"Content-Encoding": "gzip", "Cache-Control": _FOR_GOOD}
         return Response(script.packed, 200, headers, "text/javascript")
 
-    _add_spans(routes, queries, worker, read_clock)
-
-
-def _add_spans(
-    routes: APIRouter, queries: Queries, worker: Apart, read_clock: Clock
-) -> None:
-    """Add what is measured all day."""
-
     @routes.get(
         "/api/v1/history/climate",
         summary="The air over a range",
         description="Readings, or their means over slices of time, and Plotly figures "
         "of them; the last 24 hours unless told.",
-        response_class=Response,
-        responses={200: {"content": {"application/json": {}}}},
+        **_FIGURES,
     )
     async def climate(asked: Annotated[Span, Query()]) -> Response:
         since, until = range_of(asked, read_clock().wall, _DAY_S)
@@ -125,8 +115,7 @@ def _add_spans(
         summary="Other equipment over a range",
         description="A Plotly figure of each attribute that was heard, by entity and "
         "attribute; the last 24 hours unless told.",
-        response_class=Response,
-        responses={200: {"content": {"application/json": {}}}},
+        **_FIGURES,
     )
     async def equipment(asked: Annotated[Span, Query()]) -> Response:
         since, until = range_of(asked, read_clock().wall, _DAY_S)
@@ -153,41 +142,35 @@ def _draw_charts(
     )
 
 
-def _draw_climate(series: ClimateSeries, since: float, until: float) -> bytes:
-    figures = charts.climate_figures(series)
-    return write_json(
-        {
-            "since": format_stamp(since),
-            "until": format_stamp(until),
-            "slice_s": round(series.slice_s, 3),
-            "items": _readings(series),
-            **charts.library_facts(),
-            "figures": {kind: Fragment(drawn) for kind, drawn in figures.items()},
-        }
-    )
+def _draw_climate(air: ClimateSeries, since: float, until: float) -> bytes:
+    columns = (air.at, air.temperature, air.relative_humidity, air.co2)
+    items = [ClimateReading.of_series(*one) for one in zip(*columns, strict=True)]
+    figures = charts.climate_figures(air)
+    return _spanned(since, until, figures, slice_s=round(air.slice_s, 3), items=items)
 
 
 def _draw_equipment(
-    series: Mapping[tuple[str, str], MeasurementSeries], since: float, until: float
+    found: Mapping[tuple[str, str], MeasurementSeries], since: float, until: float
 ) -> bytes:
     figures = {
-        f"{entity_id}/{attribute}": Fragment(charts.measurement_figure(one))
-        for (entity_id, attribute), one in series.items()
+        "/".join(of): charts.measurement_figure(one) for of, one in found.items()
     }
+    return _spanned(since, until, figures)
+
+
+def _spanned(
+    since: float, until: float, figures: Mapping[str, bytes], **other: object
+) -> bytes:
+    """The answer about a range: figures by name, and what else there is."""
     return write_json(
         {
             "since": format_stamp(since),
             "until": format_stamp(until),
+            **other,
             **charts.library_facts(),
-            "figures": figures,
+            "figures": {name: Fragment(drawn) for name, drawn in figures.items()},
         }
     )
-
-
-def _readings(series: ClimateSeries) -> list[ClimateReading]:
-    """Oldest first."""
-    columns = (series.at, series.temperature, series.relative_humidity, series.co2)
-    return [ClimateReading.of_series(*one) for one in zip(*columns, strict=True)]
 
 
 def stop_records_router(
@@ -238,11 +221,11 @@ async def _kept(queries: Queries, command_id: str) -> Command | None:
     found = await queries.one(COMMANDS, command_id)
     if found is None:
         return None
-    return Command.of_record(found, await queries.command_events(command_id))
+    return Command.from_record(found, await queries.command_events(command_id))
 
 
 def _joined(followed: Command | None, kept: Command | None) -> Command | None:
-    """What goes on, beside what only the history tells: how it ended, and its steps."""
+    """Join a command of now with what only the history tells: outcome and steps."""
     if followed is None or kept is None:
         return followed or kept
     ended = {"outcome": kept.outcome, "was_loud": kept.was_loud, "steps": kept.steps}
@@ -269,7 +252,7 @@ def _robot(robot_id: str, stops: list[CommandLatency]) -> RobotLatency:
 
 
 def _by_transport(took: list[ByTransport]) -> dict[TransportId, LatencySpread]:
-    """Of each transport of the table, and of those that rows know besides."""
+    """Spread for each transport of the table, and for those that rows know besides."""
     known = dict.fromkeys(one.id for one in TRANSPORTS)
     known |= dict.fromkeys(transport for one in took for transport in one)
     return {
@@ -279,8 +262,8 @@ def _by_transport(took: list[ByTransport]) -> dict[TransportId, LatencySpread]:
 
 
 _DAY = timedelta(days=1)
-_MOST_PAGES = 20
-"""So many pages of rows are read; a day with more is told by those."""
+_MOST_DECISIONS = 20 * MOST_ROWS
+"""So many are read; a day with more is told by those."""
 ReadDay = Callable[[date, float], Awaitable[Day]]
 """Has one day read from the history, as far as it has gone (Unix s)."""
 
@@ -303,33 +286,25 @@ async def _read(queries: Queries, greenhouse: Greenhouse, day: date, now: float)
     worked = worked_minutes(poses, greenhouse)
     decisions = await _decisions(queries, since, until)
     slowed = slowed_minutes(decisions, greenhouse, until)
-    met = encounter_counts(decisions)
+    by_name = [
+        Worked(lane=lane, robot_id=robot, minutes=robots[robot])
+        for lane, robots in worked.items()
+        for robot in sorted(robots, key=as_counted)
+    ]
+    by_length = [
+        Slowed(cause=cause, lane=lane, minutes=minutes)
+        for (cause, lane), minutes in sorted(slowed.items(), key=lambda one: -one[1])
+    ]
     return Day(
         day=day.isoformat(),
         since=format_stamp(since),
         until=format_stamp(until),
         robots=sorted({pose.robot_id for pose in poses}, key=as_counted),
-        worked=[
-            Worked(lane=lane, robot_id=robot, minutes=round(minutes, 1))
-            for lane, robots in worked.items()
-            for robot, minutes in sorted(
-                robots.items(), key=lambda one: as_counted(one[0])
-            )
-        ],
-        slowed=[
-            Slowed(cause=cause, lane=lane, minutes=round(minutes, 1))
-            for (cause, lane), minutes in sorted(
-                slowed.items(), key=lambda one: -one[1]
-            )
-        ],
-        encounters=Encounters(
-            count=met.count,
-            slowed=met.slowed,
-            foretold=met.foretold,
-            foretold_s=rounded(met.foretold_s, 1),
-        ),
+        worked=by_name,
+        slowed=by_length,
+        encounters=Encounters.from_value(encounter_counts(decisions)),
         passes=[_pass(one) for one in closest_passes(poses, seen, greenhouse)],
-        stops=[Command.of_record(one) for one in await _stops(queries, since, until)],
+        stops=[Command.from_record(one) for one in await _stops(queries, since, until)],
         unseen=len(await queries.unseen_alerts(MOST_KEPT)),
         lost=list(await queries.ask(lost_of, since, until)),
         map=GreenhouseMap.of(greenhouse),
@@ -340,13 +315,12 @@ async def _decisions(
     queries: Queries, since: float, until: float
 ) -> list[DecisionRecord]:
     asked = Filter(since=since, until=until, limit=MOST_ROWS)
+    pages = queries.pages(DECISIONS, await queries.page(DECISIONS, asked), asked)
     found: list[DecisionRecord] = []
-    for _ in range(_MOST_PAGES):
-        page = await queries.page(DECISIONS, asked)
-        found += page.items
-        if page.next is None:
+    async for page in pages:
+        found += page
+        if len(found) >= _MOST_DECISIONS:
             break
-        asked = Filter(since=since, until=until, limit=MOST_ROWS, cursor=page.next)
     return found
 
 
@@ -357,15 +331,11 @@ async def _stops(queries: Queries, since: float, until: float) -> list[CommandRe
 
 
 def _pass(one: Passing) -> Pass:
-    return Pass(
-        at=format_stamp(one.at),
-        robot_id=one.robot_id,
-        distance_m=round(one.distance_m, 2),
-        speed=round(one.speed, 2),
-        robot=Point(x=round(one.robot[0], 2), y=round(one.robot[1], 2)),
-        person=Point(x=round(one.person[0], 2), y=round(one.person[1], 2)),
-        lane=one.lane,
-    )
+    return Pass.from_value(one, robot=_point(one.robot), person=_point(one.person))
+
+
+def _point(place: tuple[float, float]) -> Point:
+    return Point(x=round(place[0], 2), y=round(place[1], 2))
 
 
 def router(read: ReadDay, pages: Pages, clock: Clock) -> APIRouter:
@@ -385,7 +355,7 @@ def router(read: ReadDay, pages: Pages, clock: Clock) -> APIRouter:
             HistoryDay | None, Query(description="Today unless told")
         ] = None,
     ) -> Response:
-        """What the fleet did on one day, Europe/Madrid, and what is due next."""
+        """Summary of one day of the fleet, Europe/Madrid, and what is due next."""
         now = clock().wall
         return Json(await read(day or in_madrid(now).date(), now))
 

@@ -61,9 +61,9 @@ def _write(form: Form, rows: Sequence[DetectionRecord]) -> bytes:
             DetectionRecord, rows
         )
     if form == "ndjson":
-        return exports.ndjson_rows(DetectionRow.of_row, ((one,) for one in rows))
+        return exports.ndjson_rows(DetectionRow.from_record, ((one,) for one in rows))
     return write_json(
-        {"items": [DetectionRow.of_row(one) for one in rows], "next": None}
+        {"items": [DetectionRow.from_record(one) for one in rows], "next": None}
     )
 
 
@@ -156,7 +156,7 @@ def words_router(detectors: Detectors, marks: ThingMarks, clock: Clock) -> APIRo
     )
     async def things() -> Response:
         """Every place that an operator marked."""
-        return Json(Listing(items=[Thing.of(one) for one in marks.known]))
+        return Json(Listing(items=[Thing.from_value(one) for one in marks.known]))
 
     @routes.post(
         "/things",
@@ -173,11 +173,11 @@ def words_router(detectors: Detectors, marks: ThingMarks, clock: Clock) -> APIRo
         now = clock()
         until = start_of(in_madrid(now.wall).date() + timedelta(days=1))
         thing = marks.mark(body.person_id, who.name, until, now)
-        return Json(Thing.of(thing), 201)
+        return Json(Thing.from_value(thing), 201)
 
     @routes.delete("/things/{thing_id}", response_model=Thing, tags=["people"])
     async def unmark(thing_id: str, who: Operator) -> Response:
         """Take a mark back: from now on whoever is there is somebody."""
-        return Json(Thing.of(marks.unmark(thing_id, who.name, clock())))
+        return Json(Thing.from_value(marks.unmark(thing_id, who.name, clock())))
 
     return routes

@@ -11,20 +11,21 @@ import codecs
 import csv
 import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Literal, TypeVar
+from typing import Literal, TypeVar
 
 from starlette.datastructures import Headers
 
 from iveg.domain.records import (
+    SHOWN_COLUMNS,
     AlertRecord,
+    Column,
     DecisionRecord,
     LogRecord,
     Record,
 )
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import Model, write_json
-from iveg.models.decision import sentence_of
-from iveg.models.dictionary import readers_of
+from iveg.models.history import sentence_of
 from iveg.web.pages.sentences import Sentences
 
 Form = Literal["json", "csv", "ndjson"]
@@ -35,6 +36,8 @@ MEDIA_TYPES: dict[Form, str] = {
 }
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 R = TypeVar("R", bound=Record)
+_Told = LogRecord | AlertRecord | DecisionRecord
+"""Rows with a sentence; the others are numbers alone."""
 
 
 def form_of(headers: Headers) -> Form:
@@ -57,10 +60,10 @@ def csv_head(kind: type[R], reader: Sentences | None = None) -> bytes:
         kind: What each row is.
         reader: Whose spreadsheet it is for; None for programs.
     """
-    head = [name.rstrip("_") for name, _ in readers_of(kind)]
+    head = [one.name for one in SHOWN_COLUMNS[kind]]
     if reader is None:
         return csv_lines([head])
-    if _telling(kind, reader):
+    if issubclass(kind, _Told):
         head = [reader.say("export.sentence", {}), *head]
     return codecs.BOM_UTF8 + csv_lines([head], reader)
 
@@ -69,25 +72,21 @@ def csv_rows(
     kind: type[R], records: Iterable[R], reader: Sentences | None = None
 ) -> bytes:
     """Rows below that line, times in UTC."""
-    columns = list(readers_of(kind))
-    tell = None if reader is None else _telling(kind, reader)
     rows = []
     for record in records:
-        row = [cell(name, read(record), reader) for name, read in columns]
-        rows.append([tell(record), *row] if tell else row)
+        row = [_cell_of(one, record, reader) for one in SHOWN_COLUMNS[kind]]
+        if reader is not None and isinstance(record, _Told):
+            said = sentence_of(record) if isinstance(record, DecisionRecord) else record
+            row = [_safe(reader.say(said.key, said.slots)), *row]
+        rows.append(row)
     return csv_lines(rows, reader)
 
 
-def _telling(kind: type[R], reader: Sentences) -> Callable[[Any], str] | None:
-    """The sentence of a row; None for rows of numbers alone."""
-    if kind not in (LogRecord, AlertRecord, DecisionRecord):
-        return None
-
-    def tell(row: Any) -> str:
-        said = sentence_of(row) if kind is DecisionRecord else row
-        return _safe(reader.say(said.key, said.slots))
-
-    return tell
+def _cell_of(column: Column, record: Record, reader: Sentences | None) -> str:
+    value = column.read(record)
+    if column.type == "time" and value is not None:
+        return format_stamp(value)
+    return cell(value, reader)
 
 
 def ndjson_rows(
@@ -106,14 +105,12 @@ def csv_lines(rows: Iterable[Sequence[str]], reader: Sentences | None = None) ->
     return text.getvalue().encode()
 
 
-def cell(name: str, value: object, reader: Sentences | None = None) -> str:
-    """A value as a cell of the column of this name; empty for None."""
+def cell(value: object, reader: Sentences | None = None) -> str:
+    """A value as a cell; empty for None."""
     if value is None:
         return ""
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, float) and (name == "at" or name.endswith("_at")):
-        return format_stamp(value)
     if isinstance(value, float) and reader is not None:
         return reader.decimal(str(value))
     if isinstance(value, Mapping | list):

@@ -1,15 +1,13 @@
 """The history over HTTP: lists to filter and export, and figures.
 
 Lists answer JSON, CSV or NDJSON, as ``Accept`` or ``format`` says.
-
-The lists of the history: of each its source and its models.
 """
 
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Annotated, Any, Generic, TypeVar, cast
+from typing import Annotated, Any, Generic, TypeVar
 
 from fastapi import APIRouter, Depends, HTTPException, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
@@ -22,14 +20,19 @@ from iveg.adapters.history.queries import Queries
 from iveg.domain.errors import HopError
 from iveg.domain.fleet import NOBODY, FleetDescription
 from iveg.domain.records import CommandRecord, DecisionRecord, Record
-from iveg.models.alert import Alert, AuditEntry, LogEntry
-from iveg.models.base import Listing, Model, Reading, write_json
+from iveg.models.base import Listing, Row, write_json
 from iveg.models.command import Command
-from iveg.models.decision import Decision
 from iveg.models.dictionary import DictionaryColumn, dictionary_columns
-from iveg.models.equipment import Measurement
+from iveg.models.history import (
+    Alert,
+    AuditEntry,
+    Decision,
+    LogEntry,
+    Measurement,
+    OdometryRow,
+    Reading,
+)
 from iveg.models.people import DetectionRow
-from iveg.models.robot import OdometryRow
 from iveg.vital.ports import Clock
 from iveg.web.api import day, exports
 from iveg.web.api.answers import FEW_ROWS, Apart, Json
@@ -47,7 +50,7 @@ class HistoryList(Generic[R]):
     """One list: its source and its models.
 
     Attributes:
-        model: Of a row, and of what ``beside`` found for it.
+        shape: Model of a row.
         beside: Other rows that the models of some rows need, in their order.
         needs: What whoever asks must be allowed.
         of_now: Those of this moment, which no database has to be asked for.
@@ -55,58 +58,27 @@ class HistoryList(Generic[R]):
 
     path: str
     of: ListOf[R]
-    model: Callable[..., Model]
-    listing: type[Listing[Any]]
+    shape: type[Row]
     says: str
     beside: Callable[[Sequence[R]], Awaitable[list[Any]]] | None = None
     needs: Action = "read"
     of_now: Callable[[], list[Alert]] | None = None
 
+    @property
+    def model(self) -> Callable[..., Row]:
+        """Makes the model of a row, and of what ``beside`` found for it."""
+        return self.shape.from_record
+
+    @property
+    def listing(self) -> type[Listing[Any]]:
+        """A page of it."""
+        return Listing[self.shape]  # type: ignore[name-defined]
+
     async def rows(self, records: Sequence[R]) -> list[tuple[Any, ...]]:
-        """What ``model`` is called with, for each record."""
+        """Arguments of ``model``, for each record."""
         if self.beside is None:
             return [(one,) for one in records]
         return list(zip(records, await self.beside(records), strict=True))
-
-
-_MEASURED: tuple[HistoryList[Any], ...] = (
-    HistoryList(
-        "detections",
-        lists.DETECTIONS,
-        DetectionRow.of_row,
-        Listing[DetectionRow],
-        "What robots saw, by when it reached iVeg",
-    ),
-    HistoryList(
-        "tracks",
-        lists.TRACKS,
-        DetectionRow.of_row,
-        Listing[DetectionRow],
-        "Where people were: their detections, by when each reached iVeg",
-    ),
-    HistoryList(
-        "odometry",
-        lists.ODOMETRY,
-        OdometryRow.of_record,
-        Listing[OdometryRow],
-        "Poses and speeds of robots with their speed limits, twice a second",
-    ),
-    HistoryList(
-        "readings",
-        lists.READINGS,
-        Reading.of_record,
-        Listing[Reading],
-        "What small sensors of robots said; `class` asks for a kind, as `battery`",
-    ),
-    HistoryList(
-        "measurements",
-        lists.MEASUREMENTS,
-        Measurement.of_record,
-        Listing[Measurement],
-        "Numbers of other equipment; `class` asks for an entity or an attribute",
-    ),
-)
-"""What was measured; each column of the CSV is a key of the JSON."""
 
 
 def lists_of(
@@ -123,42 +95,61 @@ def lists_of(
         HistoryList(
             "decisions",
             lists.DECISIONS,
-            Decision.of_record,
-            Listing[Decision],
+            Decision,
             "Why robots were slowed, by when it began",
         ),
         HistoryList(
             "commands",
             lists.COMMANDS,
-            Command.of_record,
-            Listing[Command],
+            Command,
             "Every STOP, release and resume, by when it was asked",
             beside=steps_of,
         ),
         HistoryList(
             "alerts",
             lists.ALERTS,
-            Alert.of_record,
-            Listing[Alert],
+            Alert,
             "Every alert, by when it was last raised",
             of_now=alerts_of_now,
         ),
-        HistoryList(
-            "log",
-            lists.LOG,
-            LogEntry.of_record,
-            Listing[LogEntry],
-            "The action and inference log",
-        ),
+        HistoryList("log", lists.LOG, LogEntry, "The action and inference log"),
         HistoryList(
             "audit",
             lists.AUDIT,
-            AuditEntry.of_record,
-            Listing[AuditEntry],
+            AuditEntry,
             "Who did what; `robot` asks for a subject, `class` for an action or name",
             needs="release",
         ),
-        *_MEASURED,
+        HistoryList(
+            "detections",
+            lists.DETECTIONS,
+            DetectionRow,
+            "What robots saw, by when it reached iVeg",
+        ),
+        HistoryList(
+            "tracks",
+            lists.TRACKS,
+            DetectionRow,
+            "Where people were: their detections, by when each reached iVeg",
+        ),
+        HistoryList(
+            "odometry",
+            lists.ODOMETRY,
+            OdometryRow,
+            "Poses and speeds of robots with their speed limits, twice a second",
+        ),
+        HistoryList(
+            "readings",
+            lists.READINGS,
+            Reading,
+            "What small sensors of robots said; `class` asks for a kind, as `battery`",
+        ),
+        HistoryList(
+            "measurements",
+            lists.MEASUREMENTS,
+            Measurement,
+            "Numbers of other equipment; `class` asks for an entity or an attribute",
+        ),
     )
 
 
@@ -208,7 +199,7 @@ def router(
         found = present(decision_id) or await queries.one(lists.DECISIONS, decision_id)
         if found is None:
             raise HTTPException(404, "There is no such decision.")
-        return Json(Decision.of_record(found))
+        return Json(Decision.from_record(found))
 
     @routes.get(
         "/api/v1/exports/dictionary",
@@ -257,7 +248,7 @@ async def _with_now(
     with suppress(HopError):
         page = await queries.page(one.of, asked)
     told = {alert.alert_id for alert in now}
-    stored = [cast("Alert", one.model(*row)) for row in await one.rows(page.items)]
+    stored = [one.model(*row) for row in await one.rows(page.items)]
     items = [*now, *(alert for alert in stored if alert.alert_id not in told)]
     items.sort(key=lambda alert: alert.last_raised_at, reverse=True)
     after = None if page.next is None else lists.write_cursor(page.next)
@@ -274,7 +265,7 @@ async def _listing(page: Page[R], one: HistoryList[R], worker: Apart) -> Respons
     return Json({"items": items_json, "next": after})
 
 
-def _write_items(model: Callable[..., Model], rows: Sequence[tuple[Any, ...]]) -> bytes:
+def _write_items(model: Callable[..., Row], rows: Sequence[tuple[Any, ...]]) -> bytes:
     return write_json([model(*row) for row in rows])
 
 

@@ -43,14 +43,14 @@ _About = tuple[str, float, float, str]
 
 
 class Recordings(Protocol):
-    """What came in."""
+    """Recordings of what came in."""
 
     async def excerpt(self, target: Path, since: float, until: float) -> int:
         """Write what came in between two moments (Unix s).  Raises HopError."""
 
 
 class About(Span):
-    """What a pack is about: a range, or one of the rest with its surroundings."""
+    """Subject of a pack: a range, or one of the rest with its surroundings."""
 
     decision: str | None = Field(None, pattern=r"^[ -~]{1,64}$")
     command: str | None = Field(None, pattern=r"^[ -~]{1,64}$")

@@ -28,7 +28,13 @@ from iveg.domain.latency import (
 from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import write_json
-from iveg.models.health import LatencyClock, LatencyRow, LatencyTable, SegmentSpread
+from iveg.models.health import (
+    LatencyClock,
+    LatencyRow,
+    LatencyTable,
+    SegmentSpread,
+    in_ms,
+)
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Apart
 from iveg.web.api.exports import MEDIA_TYPES, cell, csv_lines, form_of
@@ -94,7 +100,7 @@ def write_csv(sketches: Mapping[Cell, Sketch]) -> bytes:
     rows = [["data", "hop", *names]]
     for (data, hop), sketch in sketches.items():
         spread = vars(_spread(sketch))
-        rows.append([data, hop, *(cell(name, spread[name]) for name in names)])
+        rows.append([data, hop, *(cell(spread[name]) for name in names)])
     return csv_lines(rows)
 
 
@@ -104,27 +110,23 @@ def _row(data: Data, sketches: Mapping[Cell, Sketch]) -> LatencyRow:
     )
 
 
-def _spread(of: Sketch) -> SegmentSpread:
+def _spread(sketch: Sketch) -> SegmentSpread:
     return SegmentSpread(
-        count=of.count,
-        mean_ms=_ms(of.mean),
-        p50_ms=_ms(of.quantile(0.50)),
-        p95_ms=_ms(of.quantile(0.95)),
-        p99_ms=_ms(of.quantile(0.99)),
+        count=sketch.count,
+        mean_ms=in_ms(sketch.mean),
+        p50_ms=in_ms(sketch.quantile(0.50)),
+        p95_ms=in_ms(sketch.quantile(0.95)),
+        p99_ms=in_ms(sketch.quantile(0.99)),
     )
 
 
-def _clock(robot_id: str, of: ClockOffset) -> LatencyClock:
+def _clock(robot_id: str, offset: ClockOffset) -> LatencyClock:
     return LatencyClock(
         robot_id=robot_id,
-        state=of.state,
-        offset_ms=_ms(of.offset_s),
-        uncertainty_ms=_ms(of.uncertainty_s),
+        state=offset.state,
+        offset_ms=in_ms(offset.offset_s),
+        uncertainty_ms=in_ms(offset.uncertainty_s),
     )
-
-
-def _ms(seconds: float | None) -> float | None:
-    return None if seconds is None else round(1000.0 * seconds, 2)
 
 
 def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:

@@ -31,10 +31,10 @@ from iveg.models.base import (
     Scan,
     write_json,
 )
-from iveg.models.equipment import Climate, Tile
 from iveg.models.health import Health
 from iveg.models.people import Person
 from iveg.models.robot import Device, Robot
+from iveg.models.snapshot import Climate, Tile
 from iveg.vital.evaluate import Evaluator
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.transports import TRANSPORTS
-from iveg.models.day import Day
+from iveg.models.history import Day
 
 Theme = Literal["auto", "light", "dark", "sunlight"]
 HUES = 10

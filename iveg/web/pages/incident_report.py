@@ -15,7 +15,7 @@ from iveg.domain.records import (
     Record,
 )
 from iveg.domain.stamps import format_stamp
-from iveg.models.decision import sentence_of
+from iveg.models.history import sentence_of
 from iveg.web.pages.sentences import (
     Sentences,
     in_madrid,

@@ -9,7 +9,6 @@ from sqlalchemy.exc import DBAPIError
 from iveg.adapters.history.engine import reading_engine
 from iveg.adapters.history.recorder import Store
 from iveg.adapters.history.upkeep import purge_piece
-from iveg.domain.audit import ITSELF
 from iveg.domain.retention import PurgeStep
 from iveg.vital.record import Waiting
 from tests.fakes.records import NOON, audit_record
@@ -33,12 +32,6 @@ def _waiting(number: int) -> Waiting:
 def ids(store: Store) -> list[str]:
     query = text("SELECT audit_id FROM audit ORDER BY seq")
     return store.run(lambda one: list(one.scalars(query)))
-
-
-def test_a_row_that_is_offered_again_is_stored_once(store: Store) -> None:
-    store.write([_waiting(5), _waiting(6)])
-
-    assert ids(store) == ["A1", "A2", "A3", "A4", "A5", "A6"]
 
 
 def refused(database_url: str, statement: str) -> None:
@@ -71,7 +64,3 @@ def test_retention_alone_takes_what_is_over_and_the_rest_stays_guarded(
 
     assert (took, ids(store)) == (3, ["A4", "A5"])
     refused(database_url, "DELETE FROM audit")
-
-
-def test_what_iveg_does_itself_has_a_name() -> None:
-    assert (ITSELF.name, ITSELF.role) == ("iVeg", "system")

@@ -12,13 +12,9 @@ from iveg.adapters.history.engine import alembic_config, upgrade, writing_engine
 from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Store
-from iveg.domain.records import Record
 from iveg.vital.record import Waiting
 from tests.fakes.records import (
     NOON,
-    alert_record,
-    decision_record,
-    detection_record,
     log_record,
 )
 
@@ -81,31 +77,6 @@ async def test_rows_of_the_version_before_read_as_values(
     assert (boxed.box, unboxed.box) == ({"xmin": -4.0, "frame_id": "map"}, None)
     assert alert.slots == {"robot": "AGI"}
     assert (line.slots, spoilt.slots) == ({"robot": "Túnel"}, {})
-
-
-async def test_what_is_stored_is_found_by_its_members(
-    empty_url: str, queries: Queries
-) -> None:
-    records: tuple[Record, ...] = (
-        alert_record(),
-        decision_record(),
-        detection_record(),
-        log_record(),
-    )
-    store = Store(empty_url)
-    store.write([Waiting(record, n, 0.0) for n, record in enumerate(records, 1)])
-    store.close()
-    member = {
-        "sqlite": "json_extract(slots, '$.robot')",
-        "postgresql": "slots ->> 'robot'",
-    }
-
-    with connected(empty_url) as connection:
-        wanted = f"SELECT {member[connection.dialect.name]} FROM log"  # noqa: S608
-        robot = connection.scalar(text(wanted))
-
-    [line] = (await queries.page(lists.LOG, Filter(since=NOON))).items
-    assert (robot, line.slots) == ("AGI", {"robot": "AGI"})
 
 
 async def test_a_row_whose_json_has_another_shape_hides_no_other(

@@ -7,7 +7,7 @@ from alembic.runtime.migration import MigrationContext
 from sqlalchemy import Connection, text
 
 from iveg.adapters.history.engine import sqlite_url, upgrade, writing_engine
-from iveg.adapters.history.upkeep import metadata
+from iveg.adapters.history.tables import metadata
 from iveg.domain.errors import DataFileError, HopError
 
 PARTS = "odometry_", "detections_"

@@ -221,7 +221,7 @@ async def test_a_purge_beside_recording_loses_no_row(
     write(database_url, [odometry_record(at=OLD + n / 10) for n in range(1000)])
     recorder = Recorder(database_url, FileJournal(tmp_path / "journal"))
     writing = asyncio.create_task(recorder.run())
-    history = RecordedHistory(recorder, queries, tmp_path)
+    history = RecordedHistory(recorder, queries, tmp_path, _no_recording)
     taken, recorded = 0, 0
 
     while True:
@@ -250,3 +250,7 @@ def test_days_of_the_log_are_found_newest_first(
 
     assert asyncio.run(queries.ask(recorded_days, 3)) == (4000, 7, 1)
     assert asyncio.run(queries.ask(recorded_days, 99)) == (4000, 7, 1, 0)
+
+
+async def _no_recording() -> bool:
+    return False

@@ -9,11 +9,10 @@ from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Store
 from iveg.adapters.history.series import (
     climate_series,
-    command_latencies,
     confidence_counts,
     speed_series,
 )
-from iveg.domain.errors import HopError, UnreadableError
+from iveg.domain.errors import UnreadableError
 from iveg.domain.records import DetectionRecord, Record
 from iveg.vital.record import Waiting
 from tests.fakes.records import (
@@ -214,27 +213,6 @@ async def test_what_has_no_end_is_found_whenever_it_began(
     assert await queries.open_alerts() == (alert_record(),)
 
 
-async def test_a_short_series_is_answered_row_by_row(
-    queries: Queries, database_url: str
-) -> None:
-    remember(
-        database_url,
-        odometry_record(at=NOON + 1, linear=0.2, limit_factor=0.5, margin_m=-0.4),
-        odometry_record(at=NOON, linear=0.4),
-        odometry_record(at=NOON, robot_id="AGII", applied_factor=None),
-        odometry_record(at=NOON + 60),
-    )
-
-    agi, agii = await queries.ask(speed_series, NOON, NOON + 60)
-
-    assert (agi.robot_id, agi.at, agi.linear) == ("AGI", (NOON, NOON + 1), (0.4, 0.2))
-    assert (agi.limit, agi.slice_s) == ((1.0, 0.5), 0.0)
-    assert (agi.margin, agii.margin) == ((None, -0.4), (None,))
-    assert agii.applied == (None,)
-    assert await queries.ask(speed_series, NOON, NOON + 60, "AGII") == (agii,)
-    assert await queries.ask(speed_series, NOON, NOON + 60, "AGIII") == ()
-
-
 async def test_a_long_series_is_thinned_and_keeps_a_short_slow_down(
     queries: Queries, database_url: str
 ) -> None:
@@ -254,24 +232,6 @@ async def test_a_long_series_is_thinned_and_keeps_a_short_slow_down(
     assert [one for one in series.margin if one is not None] == [-0.4]
     assert set(series.linear) == {1.0}
     assert series.slice_s == pytest.approx(2499.5 / 1999)
-
-
-async def test_the_air_comes_back_reading_by_reading(
-    queries: Queries, database_url: str
-) -> None:
-    remember(
-        database_url,
-        climate_record(at=NOON + 60, temperature=None),
-        climate_record(),
-        climate_record(at=NOON + 120),
-    )
-
-    found = await queries.ask(climate_series, NOON, NOON + 120)
-
-    assert (found.at, found.temperature) == ((NOON, NOON + 60), (21.5, None))
-    assert (found.relative_humidity, found.co2) == ((0.7, 0.7), (430.0, 430.0))
-    assert found.slice_s == 0.0
-    assert (await queries.ask(climate_series, 0.0, 1.0)).at == ()
 
 
 async def test_a_day_of_the_air_is_means_of_five_minutes(
@@ -308,37 +268,3 @@ async def test_detections_are_counted_by_class_and_confidence(
         ("farmer", 0.95, 2),
     ]
     assert [c.class_id for c in of_agii] == ["AGII"]
-
-
-async def test_how_long_stops_took_is_counted_from_the_press(
-    queries: Queries, database_url: str
-) -> None:
-    remember(
-        database_url,
-        command_record(command_id="C2", requested_at=NOON + 1),
-        command_record(
-            sent_at={"direct": NOON + 0.125},
-            answer_at={"direct": NOON + 0.25, "fiware": NOON + 0.5},
-            standing_at=NOON + 1.5,
-            standstill_ms=1500.0,
-        ),
-        command_record(command_id="C3", kind="release"),
-    )
-
-    first, second = await queries.ask(command_latencies, NOON, NOON + 2)
-
-    assert (first.command_id, first.sent_ms) == ("C1", {"direct": 125.0})
-    assert first.answer_ms == {"direct": 250.0, "fiware": 500.0}
-    assert first.standstill_ms == 1500.0
-    assert (second.command_id, second.answer_ms) == ("C2", {})
-    assert await queries.ask(command_latencies, NOON, NOON + 2, "AGII") == ()
-
-
-async def test_a_database_that_does_not_answer_is_a_hop() -> None:
-    queries = Queries("postgresql://somebody:secret@127.0.0.1:1/history")
-
-    with pytest.raises(HopError, match="database") as caught:
-        await queries.page(lists.LOG, Filter())
-
-    queries.close()
-    assert "secret" not in str(caught.value)

@@ -13,7 +13,7 @@ from sqlalchemy import text
 
 from iveg.adapters import clock
 from iveg.adapters.history.engine import reading_engine, upgrade
-from iveg.adapters.history.recorder import Recorder, spilled_file
+from iveg.adapters.history.recorder import Recorder
 from iveg.adapters.journal import FileJournal
 from iveg.domain.observations import Instant
 from iveg.domain.records import Record
@@ -371,13 +371,3 @@ async def test_what_the_disk_did_not_take_waits_for_the_database(
     (tmp_path / "journal").rmdir()
     await recorder.close()
     assert scalar(sqlite_url, "SELECT count(*) FROM commands") == 1
-
-
-def test_what_an_earlier_version_spilled_lies_where_it_put_it() -> None:
-    directory = Path("/data")
-
-    beside = spilled_file("sqlite:////var/lib/history.db", directory)
-    apart = spilled_file("postgresql://server/history", directory)
-
-    assert beside == Path("/var/lib/history.db.journal")
-    assert apart == Path("/data/history.spill_file")

@@ -7,7 +7,7 @@ import pytest
 
 from iveg.adapters.history.engine import reading_engine
 from iveg.adapters.history.recorder import Store
-from iveg.adapters.history.stats import HistoryStats, TableStats, read_stats
+from iveg.adapters.history.upkeep import HistoryStats, TableStats, read_stats
 from iveg.domain.records import Record
 from iveg.vital.record import Waiting
 from tests.fakes.records import NOON, climate_record, odometry_record

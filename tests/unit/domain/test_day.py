@@ -9,7 +9,6 @@ from iveg.domain.day import (
     closest_passes,
     encounter_counts,
     slowed_minutes,
-    worked_minutes,
 )
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import DriveLane, Greenhouse
@@ -28,13 +27,6 @@ GREENHOUSE = Greenhouse(
 
 def pose(second: int, x: float = 1.0, y: float = 2.0, speed: float = 0.5) -> Pose:
     return Pose("AGI", second, x, y, speed)
-
-
-def test_an_aisle_is_worked_while_a_robot_drives_in_it() -> None:
-    driven = [pose(n) for n in range(90)]
-    elsewhere = [pose(100, y=5.0), pose(101, y=7.0, speed=0.0)]
-
-    assert worked_minutes([*driven, *elsewhere], GREENHOUSE) == {"1": {"AGI": 1.5}}
 
 
 def test_a_robot_slowed_twice_at_once_is_slowed_once() -> None:

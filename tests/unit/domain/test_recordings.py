@@ -35,9 +35,3 @@ def test_the_one_that_is_written_stays() -> None:
     gone = names(RecordingLimits(days=1, most_bytes=1), files)
     assert len(gone) == 6
     assert "2026-11-19T08" not in gone
-
-
-def test_a_clock_that_was_ahead_for_a_while_costs_one_day_of_seven() -> None:
-    week = [recording(f"2026-11-{day}T08-00-00Z") for day in range(10, 17)]
-    ahead = recording("2036-01-01T08-00-00Z")
-    assert names(RecordingLimits(), [*week, ahead]) == ["2026-11-10T08"]

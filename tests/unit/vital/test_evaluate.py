@@ -16,7 +16,7 @@ from iveg.domain.records import (
     DetectionRecord,
     OdometryRecord,
 )
-from iveg.models.decision import Decision
+from iveg.models.history import Decision
 from tests.builders import detection, detection_frame
 from tests.fakes.records import alert_record
 from tests.unit.vital.desk import Desk, conditions_of
@@ -47,7 +47,7 @@ def test_13_13_a_decision_remembers_where_the_robots_were() -> None:
 
     meet(desk)
 
-    view = Decision.of_record(desk.records(DecisionRecord)[-1])
+    view = Decision.from_record(desk.records(DecisionRecord)[-1])
     assert {one.robot_id for one in view.places} == {"AGI", "AGII"}
     assert isinstance(view.rule.parameters, dict)
     assert "places" not in view.rule.parameters

@@ -53,18 +53,6 @@ def test_a_look_between_two_rows_that_slows_a_robot_has_a_row() -> None:
     assert row.box is not None
 
 
-def test_a_robot_that_enters_the_ring_seconds_after_the_last_look_has_its_row() -> None:
-    desk = Desk()
-    desk.drive("AGI", 0.0)
-    desk.drive("AGII", 50.0)
-    look_on(desk, 5.0, seconds=0.8)
-    desk.clock.now += 4.0
-    desk.drive("AGI", 4.0)
-
-    (decision,) = decisions_of(desk)
-    assert evidence_of(decision, desk.records(DetectionRecord))
-
-
 def test_two_decisions_about_one_look_share_its_row() -> None:
     desk = Desk(("AGI", "AGII", "AG3"))
     desk.drive("AGI", 0.0)

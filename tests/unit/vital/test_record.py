@@ -76,14 +76,6 @@ def test_orders_stay_even_when_there_is_no_room() -> None:
     assert queue.dropped == len(KEPT) - 2
 
 
-def test_what_may_not_be_lost_is_taken_first() -> None:
-    queue = queue_of(10, odometry_record(), command_record())
-
-    assert records(queue.dequeue(1)) == [command_record()]
-    assert records(queue.dequeue(1)) == [odometry_record()]
-    assert queue.dequeue(1) == []
-
-
 def test_what_is_put_back_stands_where_it_stood() -> None:
     queue = queue_of(
         10, odometry_record(x=1.0), odometry_record(x=2.0), odometry_record(x=3.0)
@@ -93,14 +85,6 @@ def test_what_is_put_back_stands_where_it_stood() -> None:
 
     xs = [getattr(record, "x", None) for record in records(queue.dequeue(10))]
     assert xs == [1.0, 2.0, 3.0]
-
-
-def test_the_queue_knows_how_long_its_oldest_record_waits() -> None:
-    queue = queue_of(10, odometry_record(), command_record())
-
-    assert queue.oldest_since() == 0.0
-    queue.dequeue(2)
-    assert queue.oldest_since() is None
 
 
 def test_odometry_is_thinned_to_two_a_second_for_each_robot() -> None:

@@ -13,7 +13,7 @@ from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.upkeep import purge_piece
 from iveg.domain.records import Record
 from iveg.domain.retention import DAY_S, PURGE_STEPS
-from iveg.models.day import Day
+from iveg.models.history import Day
 from iveg.web.api import day
 from tests.fakes.records import (
     alert_record,

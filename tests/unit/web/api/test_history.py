@@ -17,7 +17,7 @@ from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Store
 from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, ReadingRecord, Record
-from iveg.models.alert import Alert
+from iveg.models.history import Alert
 from iveg.vital.record import Waiting
 from iveg.web import problems
 from iveg.web.api import exports
@@ -101,7 +101,7 @@ async def test_alerts_of_now_come_from_memory_whatever_the_database_says(
     stored = [alert_record(alert_id=one, last_raised_at=NOON) for one in ("A1", "A2")]
     past.holds(*stored)
     newer = alert_record(alert_id="A1", last_raised_at=NOON + 1.0, note="seen")
-    past.alerts = [Alert.of_record(newer)]
+    past.alerts = [Alert.from_record(newer)]
 
     async def told() -> list[tuple[str, str | None]]:
         items = (await client.get("/api/v1/alerts")).json()["items"]
@@ -394,7 +394,7 @@ async def test_each_column_of_what_was_measured_is_a_key_of_its_json(
         [item] = (await client.get(f"/api/v1/{path}")).json()["items"]
         lines = (await client.get(f"/api/v1/{path}?format=csv")).text
         [row] = csv.DictReader(io.StringIO(lines))
-        assert row == {name: exports.cell(name, item[name]) for name in row}
+        assert row == {name: exports.cell(item[name]) for name in row}
 
 
 async def test_a_track_is_what_was_seen_of_one_person(

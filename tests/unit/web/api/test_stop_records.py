@@ -99,7 +99,7 @@ async def test_a_command_of_this_run_is_told_with_its_steps_while_the_history_an
     )
     await recorder.close()
     desk, queries = WebDesk(), Queries(url)
-    followed = Command.of_record(record(1)).model_copy(update={"outcome": None})
+    followed = Command.from_record(record(1)).model_copy(update={"outcome": None})
 
     desk.app.include_router(
         day.stop_records_router(queries, desk.clock, lambda *_: followed)
