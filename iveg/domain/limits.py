@@ -170,5 +170,7 @@ def grown_radius(radius_m: float, age_s: float) -> float:
     It keeps its size for as long as a healthy way takes, grows as fast as a person
     walks, and never shrinks.
     """
-    walked = LIMITS.walking_m_s * max(0.0, age_s - LIMITS.growth_grace_s)
+    if age_s <= LIMITS.growth_grace_s:
+        return radius_m
+    walked = LIMITS.walking_m_s * (age_s - LIMITS.growth_grace_s)
     return max(radius_m, min(LIMITS.zone_most_m, radius_m + walked))

@@ -1,14 +1,15 @@
 """Zones round people and peers, which slow robots, and entries of robots into them."""
 
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED
-from iveg.domain.geometry import Pose2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
@@ -21,8 +22,7 @@ _ROUNDING_M = 0.01
 """Rounding moves no robot that is farther outside a zone into it."""
 
 
-@dataclass(frozen=True, slots=True)
-class Zone:
+class Zone(NamedTuple):
     """The surroundings of a person or peer, which slow every robot inside.
 
     Attributes:
@@ -119,36 +119,44 @@ Distances = dict[str, Distance]
 def distances_to_zones(
     robots: Iterable[RobotState],
     zones: Sequence[Zone],
-    entries: Mapping[str, Container[str]],
+    entries: Mapping[str, Iterable[str]],
 ) -> Iterator[tuple[RobotState, Distances]]:
     """Each robot with the causes in whose zones it is, or has an entry.
 
-    Arrays find the few zones that are near, of all robots and zones.
+    One comparison of all robots with all zones finds the few pairs that are near.
     """
-    places = [(one.x, one.y, one.radius_m) for one in zones]
-    x, y, radius = np.array(places, np.float64).reshape(-1, 3).T
-    for robot in robots:
-        if robot.odometry is None:
-            continue
-        pose, entered = robot.odometry.pose, entries.get(robot.robot_id, ())
-        inside = np.hypot(x - pose.x, y - pose.y) - radius <= _ROUNDING_M
-        near = (
-            zone
-            for zone, is_inside in zip(zones, inside.tolist(), strict=True)
-            if is_inside or zone.cause in entered
-        )
-        yield robot, _distances(robot, pose, near)
+    placed = [robot for robot in robots if robot.odometry is not None]
+    centres = np.array([(one.x, one.y, one.radius_m) for one in zones]).reshape(-1, 3)
+    poses = np.array([_place(robot) for robot in placed]).reshape(-1, 2, 1)
+    x, y, radius_m = centres.T
+    outside_m = np.hypot(x - poses[:, 0], y - poses[:, 1]) - radius_m
+    inside: dict[int, set[int]] = defaultdict(set)
+    for row, column in np.argwhere(outside_m <= _ROUNDING_M).tolist():
+        inside[row].add(column)
+    of_cause: dict[str, list[int]] = defaultdict(list)
+    for column, zone in enumerate(zones):
+        of_cause[zone.cause].append(column)
+    for row, robot in enumerate(placed):
+        entered = entries.get(robot.robot_id, ())
+        near = inside[row].union(*(of_cause[cause] for cause in entered))
+        yield robot, _distances(robot, [zones[column] for column in sorted(near)])
 
 
-def _distances(robot: RobotState, pose: Pose2D, zones: Iterable[Zone]) -> Distances:
+def _place(robot: RobotState) -> tuple[float, float]:
+    assert robot.odometry is not None  # noqa: S101 - asked of no other
+    return robot.odometry.pose.x, robot.odometry.pose.y
+
+
+def _distances(robot: RobotState, zones: Iterable[Zone]) -> Distances:
     """The deepest zone of each cause, without its own and those of other maps."""
     nearest: Distances = {}
+    x, y = _place(robot)
     for zone in zones:
         if zone.cause == robot.robot_id:
             continue
         if zone.recording not in (None, robot.recording):
             continue
-        centre_m = pose.distance_to(zone.x, zone.y)
+        centre_m = math.hypot(zone.x - x, zone.y - y)
         found = Distance(centre_m - zone.radius_m, centre_m, zone)
         known = nearest.get(zone.cause)
         if known is None or found.outside_m < known.outside_m:
@@ -156,8 +164,7 @@ def _distances(robot: RobotState, pose: Pose2D, zones: Iterable[Zone]) -> Distan
     return nearest
 
 
-@dataclass(frozen=True, slots=True)
-class ZoneEntry:
+class ZoneEntry(NamedTuple):
     """One robot inside one zone, from trigger to release.
 
     Attributes:
@@ -190,7 +197,7 @@ class ZoneEntry:
         since = None
         if outside_m > LIMITS.release_beyond_m:
             since = self.outside_since or now.mono
-        return replace(self, distance_m=distance_m, outside_since=since)
+        return self._replace(distance_m=distance_m, outside_since=since)
 
     def is_over(self, now: Instant) -> bool:
         """Whether the robot has been outside for long enough."""

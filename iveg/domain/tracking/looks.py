@@ -184,11 +184,9 @@ class _Suspect:
         # As ``log_odds`` below even, asked of everybody in each picture.
         return now - self.seen_at > FORGOTTEN_S or self.odds + self.look < 0.0
 
-    def reaches(self, one: FaintPerson, now: float) -> float | None:
-        """Distance of a detection from it (m); None: too far to be the same."""
-        apart = math.hypot(one.x - self.x, one.y - self.y)
-        walked = LIMITS.walking_m_s * abs(now - self.seen_at)
-        return apart if apart <= _NEAR_M + walked else None
+    def reach_m(self, now: float) -> float:
+        """Distance up to which a detection may be of the same (m)."""
+        return _NEAR_M + LIMITS.walking_m_s * abs(now - self.seen_at)
 
     @property
     def log_odds(self) -> float:
@@ -272,8 +270,8 @@ def _nearest(
     """The suspect that a detection is nearest to; None: it is too far from each."""
     found, least = None, math.inf
     for suspect in suspects:
-        apart = suspect.reaches(one, now)
-        if apart is not None and apart < least and not suspect.is_over(now):
+        apart = math.hypot(one.x - suspect.x, one.y - suspect.y)
+        if apart < least and apart <= suspect.reach_m(now) and not suspect.is_over(now):
             found, least = suspect, apart
     return found
 

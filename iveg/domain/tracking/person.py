@@ -16,7 +16,7 @@ from typing import Literal
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.geometry import Rectangle
-from iveg.domain.limits import LIMITS
+from iveg.domain.limits import LIMITS, grown_radius
 from iveg.domain.observations import Instant
 from iveg.domain.parameters import Class
 from iveg.domain.tracking.looks import Looks
@@ -212,12 +212,12 @@ class TrackedPerson:
         self, rule: DetectionRule, now: Instant
     ) -> Iterable[tuple[Sighting, float]]:
         """Every zone that protects this person, with its radius now (m)."""
+        fresh_m = rule.radius_m.of(self.class_)
         for sighting in self.sightings:
             age = sighting.age_s(now)
             if age <= sighting.lasts_s:
-                radius = rule.radius_at(age, self.class_) + sighting.beyond_m
-                reach = sighting.reach_m
-                yield sighting, radius if radius >= reach else reach
+                radius_m = grown_radius(fresh_m, age) + sighting.beyond_m
+                yield sighting, max(radius_m, sighting.reach_m)
 
 
 RADIUS_M = 0.5

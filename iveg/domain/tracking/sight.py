@@ -230,7 +230,9 @@ class OwnSight:
             and not look.shows(person, sighting.x, sighting.y)
             and look.in_view(watch.places, greenhouse).size == len(watch.places)
         )
-        return watch.going_on(look.at.mono) if is_empty else replace(watch, frames=0)
+        if is_empty:
+            return watch.going_on(look.at.mono)
+        return replace(watch, frames=0) if watch.frames else watch
 
     def _places_of(self, sighting: Sighting, look: Look) -> Sequence[_Place]:
         """Where to look for somebody, as it was when that was asked first."""
@@ -314,6 +316,8 @@ def _sides(
 # --- blind cameras ----------------------------------------------------------------
 
 BLIND_S = 5.0
+APART_S = 0.15
+"""Between two frames of one camera that are compared with what others see."""
 _HIDES_M = 0.5
 """Half of a person who stands between, and the error of a place."""
 
@@ -338,6 +342,8 @@ class BlindCameras:
         self._greenhouse = greenhouse
         self._missing: dict[str, dict[int, _Spell]] = {}
         """Spells by robot, and chain of the other one."""
+        self._looked_at: dict[str, float] = {}
+        """Moment of each robot's newest frame that was taken (monotonic, s)."""
 
     def take(self, look: Look, people: People, world: World) -> None:
         """Take a frame that ``people`` has taken in.
@@ -345,6 +351,14 @@ class BlindCameras:
         A frame that proves nothing (late, or somebody walks between) ends no spell:
         more than a second without a frame that does is silence, which slows anyway.
         """
+        robot, now = look.robot, look.at.mono
+        if now - self._looked_at.get(robot.robot_id, -math.inf) >= APART_S:
+            self._looked_at[robot.robot_id] = now
+            self._compare(look, people, world)
+        if robot.detector.blind_by is not None:
+            robot.detector.note_flaw("blind", look.at)
+
+    def _compare(self, look: Look, people: People, world: World) -> None:
         robot, now = look.robot, look.at.mono
         detector, before = robot.detector, self._missing.get(robot.robot_id, {})
         spells = self._missing[robot.robot_id] = {
@@ -362,8 +376,6 @@ class BlindCameras:
                 detector.blind_by = one.observer
         if detector.out_of_service is not None or (look.people and not spells):
             detector.blind_by = None
-        if detector.blind_by is not None:
-            detector.note_flaw("blind", look.at)
 
     def _sought(
         self, look: Look, people: People, world: World
