@@ -42,25 +42,25 @@ def unmet_conditions(
     """Unmet conditions of each robot, the reason for its limit first."""
     robots = world.robots.values()
     unmet = [
-        (observer, ClearCondition(reason, observer.robot_id))
+        (observer, conditions)
         for observer in robots
-        for reason in _reasons(observer, now)
+        if (conditions := _conditions(observer, now))
     ]
     return {robot.robot_id: tuple(_unmet_by(robot, unmet, now)) for robot in robots}
 
 
 def _unmet_by(
     robot: RobotState,
-    unmet: Sequence[tuple[RobotState, ClearCondition]],
+    unmet: Sequence[tuple[RobotState, Sequence[ClearCondition]]],
     now: Instant,
 ) -> Iterator[ClearCondition]:
     """Its own pose is young, and nobody in its reach leaves a condition unmet."""
     age = robot.age_s(now)
     if age is None or age > LIMITS.silence_s:
         yield ClearCondition("pose", robot.robot_id)
-    for observer, condition in unmet:
+    for observer, conditions in unmet:
         if _is_in_reach(robot, observer):
-            yield condition
+            yield from conditions
 
 
 def _is_in_reach(robot: RobotState, observer: RobotState) -> bool:
@@ -84,8 +84,14 @@ def _is_in_reach(robot: RobotState, observer: RobotState) -> bool:
     )
 
 
-def _reasons(observer: RobotState, now: Instant) -> Iterator[Reason]:
+def _conditions(observer: RobotState, now: Instant) -> list[ClearCondition]:
     """Conditions that one robot leaves unmet for everybody in its reach."""
+    return [
+        ClearCondition(reason, observer.robot_id) for reason in _reasons(observer, now)
+    ]
+
+
+def _reasons(observer: RobotState, now: Instant) -> Iterator[Reason]:
     if observer.doubts.active(now):
         yield "doubt"
     detector = observer.detector

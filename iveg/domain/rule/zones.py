@@ -150,11 +150,11 @@ def _place(robot: RobotState) -> tuple[float, float]:
 def _distances(robot: RobotState, zones: Iterable[Zone]) -> Distances:
     """The deepest zone of each cause, without its own and those of other maps."""
     nearest: Distances = {}
-    x, y = _place(robot)
+    (x, y), recording = _place(robot), robot.recording
     for zone in zones:
         if zone.cause == robot.robot_id:
             continue
-        if zone.recording not in (None, robot.recording):
+        if zone.recording not in (None, recording):
             continue
         centre_m = math.hypot(zone.x - x, zone.y - y)
         found = Distance(centre_m - zone.radius_m, centre_m, zone)

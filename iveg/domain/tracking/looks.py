@@ -268,7 +268,8 @@ def _nearest(
     one: FaintPerson, suspects: Sequence[_Suspect], now: float
 ) -> _Suspect | None:
     """The suspect that a detection is nearest to; None: it is too far from each."""
-    found, least = None, math.inf
+    # Nobody reaches farther, so most are passed by here.
+    found, least = None, _NEAR_M + LIMITS.walking_m_s * FORGOTTEN_S
     for suspect in suspects:
         apart = math.hypot(one.x - suspect.x, one.y - suspect.y)
         if apart < least and apart <= suspect.reach_m(now) and not suspect.is_over(now):
