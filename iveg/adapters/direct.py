@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
 
-from iveg.domain.kinds import KINDS, Kind, Scope
+from iveg.domain.kinds import KIND_OF, KINDS, Kind, Scope
 from iveg.domain.observations import (
     Instant,
     Observation,
@@ -113,12 +113,14 @@ class DirectReader:
             answer = partial(codec.read_answer, robot_id)
             yield names.answer_topic(apikey, robot_id), _Source(robot_id, 1, answer)
 
-    def subscriptions(self) -> dict[str, dict[str, int]]:
-        """Topics of each robot, and their QoS."""
-        found: dict[str, dict[str, int]] = {}
+    def subscriptions(self) -> list[dict[str, int]]:
+        """Topics and their QoS, apart for each robot and kind that is sent often."""
+        found: dict[object, dict[str, int]] = {}
         for topic, source in self._sources.items():
-            found.setdefault(source.robot_id, {})[topic] = source.qos
-        return found
+            is_often = source.kind is not None and KIND_OF[source.kind].speaks_alone
+            stream = source.robot_id, source.kind if is_often else None
+            found.setdefault(stream, {})[topic] = source.qos
+        return [*found.values()]
 
     def stream(self, topic: str) -> tuple[str, type[Observation]] | None:
         """The robot and the one kind of what comes on a topic, if it is one."""

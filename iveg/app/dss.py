@@ -191,7 +191,7 @@ class Dss:
             came_back,
             was_lost,
             reader.refuse_stored,
-            [*reader.subscriptions().values()],
+            reader.subscriptions(),
         )
 
     def _provisioner(self) -> Provisioner:

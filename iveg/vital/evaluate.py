@@ -54,7 +54,6 @@ class Evaluator:
 
     Attributes:
         rule: The version in force; a new one counts from the next judgement on.
-        is_urgent: Whether something new of people or obstacles awaits its judgement.
     """
 
     def __init__(self, core: Core, rule: DetectionRule) -> None:
@@ -79,7 +78,6 @@ class Evaluator:
         self._obedience = Obedience()
         self._moved: dict[str, Odometry] = {}
         self._unjudged: Instant | None = None
-        self.is_urgent = False
         self._started: Instant | None = None
         self._untold = False
 
@@ -148,7 +146,7 @@ class Evaluator:
             case SafetyReport():
                 self._reported(observation, received.at, is_kept=received.asked)
             case DetectionFrame():
-                self._await_judgement(received.at, is_urgent=True)
+                self._await_judgement(received.at)
         return True
 
     @property
@@ -156,10 +154,9 @@ class Evaluator:
         """Whether something was taken that :meth:`settle` has not judged yet."""
         return self._unjudged is not None
 
-    def _await_judgement(self, at: Instant, *, is_urgent: bool) -> None:
+    def _await_judgement(self, at: Instant) -> None:
         if self._unjudged is None or at.mono >= self._unjudged.mono:
             self._unjudged = at
-        self.is_urgent |= is_urgent
 
     def settle(self) -> None:
         """Judge the fleet once for everything that was taken since the last time."""
@@ -167,7 +164,7 @@ class Evaluator:
             self._settle(self._unjudged)
 
     def _settle(self, now: Instant) -> None:
-        self._unjudged, self.is_urgent = None, False
+        self._unjudged = None
         self._judge(now)
         for robot_id, odometry in self._moved.items():
             robot, speed_limit = self.world.robot(robot_id), self.speed_limits[robot_id]
@@ -181,7 +178,7 @@ class Evaluator:
         speed, slow = robot.motion(at).speed, slow_below(robot.profile)
         moved = self.decisions.moved(robot.robot_id, speed, at, is_slow=speed <= slow)
         self._event_log.decisions(moved)
-        self._await_judgement(at, is_urgent=False)
+        self._await_judgement(at)
         self._moved[odometry.robot_id] = odometry
 
     def _reported(self, report: SafetyReport, at: Instant, *, is_kept: bool) -> None:
@@ -193,7 +190,7 @@ class Evaluator:
             return
         measured_at = self.world.robot(report.robot_id).safety_received
         if self.tracking.witness(report, measured_at or at):
-            self._await_judgement(at, is_urgent=True)
+            self._await_judgement(at)
         if report.speed_factor != self._applied.get(report.robot_id):
             self._applied[report.robot_id] = report.speed_factor
             self._log_speed(report, at)

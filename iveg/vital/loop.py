@@ -27,10 +27,10 @@ from iveg.vital.ingest import Ingest
 
 TICK_S = 0.05
 """Time passes, and the fleet is judged, at least so often (s)."""
-POSES_S = 0.02
-"""After poses alone the fleet is judged at most so often (s)."""
-URGENT_S = 0.01
-"""After a detection frame or a robot's obstacle it is judged so soon (s)."""
+APART_S = 0.02
+"""After news the fleet is judged at once, but at most so often (s)."""
+_SHARE = 5
+"""Taking has four times as long as judging, so that nothing waits for its turn."""
 _EARLY_S = 0.001
 _ANSWERS = (CommandAnswer, GoalAnswer)
 _HEALTH_PERIOD_S = 1.0
@@ -46,6 +46,8 @@ class RuleLoop:
         self._health_monitor, self._event_log = core.health_monitor, core.event_log
         self._clock, self._supervision = core.ports.clock, core.supervision
         self._ticked = self._judged = float("-inf")
+        self._took_s = 0.0
+        """Duration of the last judgement."""
         self._health_at = float("-inf")
         self._taken: list[Received] = []
         """Observations taken since the last judgement."""
@@ -62,6 +64,7 @@ class RuleLoop:
             now = self._clock()
             if now.mono >= self._due_at:
                 self.judge(now)
+                self._took_s = self._clock().mono - now.mono
 
     @property
     def _due_at(self) -> float:
@@ -69,7 +72,7 @@ class RuleLoop:
         ticks_at = self._ticked + TICK_S - _EARLY_S
         if not self._evaluator.is_unjudged:
             return ticks_at
-        apart_s = URGENT_S if self._evaluator.is_urgent else POSES_S
+        apart_s = max(APART_S, _SHARE * self._took_s)
         return min(ticks_at, self._judged + apart_s)
 
     def step(self, arrived: Iterable[Received], now: Instant) -> None:

@@ -25,7 +25,7 @@ from iveg.web.security.headers import MAX_BODY, NOTIFICATIONS_PATH, TOO_LONG
 from iveg.web.security.roles import Action
 from iveg.web.security.secrets import NotifySecret
 
-A_TURN: Final = 4
+A_TURN: Final = 8
 """Read in one turn of the loop, which reads one message of each MQTT connection: what
 comes straight from a robot must not wait behind copies."""
 _TAKEN = Response(status_code=204)

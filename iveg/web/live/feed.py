@@ -33,7 +33,7 @@ BYTES: Final = 24_576
 """Heavy content in them (scans, detections, people): 0.2 s of a line of 1 Mbit/s."""
 GAP_S: Final = 0.002
 """Frames nearer to each other would cost more than the freshness that they bring."""
-ROBOT_GAP_S: Final = 0.0002
+ROBOT_GAP_S: Final = 0.0006
 """Gap for each robot of the fleet, where that is more: 4 ms with twenty."""
 SLOW_FRAME_S: Final = 0.03
 """A page that draws for longer than this twice is slow."""
