@@ -164,9 +164,9 @@ def test_what_a_robot_does_changes_its_own_open_decisions_once() -> None:
 
 def test_old_ended_decisions_make_room_and_open_ones_never_do() -> None:
     book = Decisions(keep=2)
-    opened = book.begin(replace(entry(), decision_id="open"), DetectionRule())
+    opened = book.begin(entry()._replace(decision_id="open"), DetectionRule())
     for number in range(5):
-        named = replace(entry(), decision_id=f"ended-{number}")
+        named = entry()._replace(decision_id=f"ended-{number}")
         book.begin(named, DetectionRule())
         book.end(named.decision_id, at(number))
 
