@@ -1,11 +1,19 @@
 """The web side of the server: routes of the present, of the past, and the pages."""
 
 import asyncio
+import os
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from stat import S_ISREG
 
+from anyio import to_thread
 from fastapi import APIRouter, Depends, FastAPI
+from starlette.datastructures import Headers
+from starlette.responses import FileResponse, Response
 from starlette.routing import Mount
+from starlette.staticfiles import NotModifiedResponse, StaticFiles
+from starlette.types import Scope
 
 from iveg import __version__
 from iveg.app.dss import Dss
@@ -14,7 +22,6 @@ from iveg.web.api.answers import Json
 from iveg.web.build import build_app, live_routers
 from iveg.web.pages import drawing, routes
 from iveg.web.security.requirements import require
-from iveg.web.static_files import KeptFiles
 
 _STATIC = Path(__file__).with_name("static")
 
@@ -89,3 +96,69 @@ def _past_routers(dss: Dss, pages: drawing.Pages) -> Iterator[APIRouter]:
     yield account.users_router(dss.accounts.people)
     yield account.tokens_router(dss.accounts.people)
     yield routes.service_worker_router()
+
+
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """A file as it was read.
+
+    Attributes:
+        version: Time of its last change (ns) and size (bytes).
+        headers: Of an answer that holds the whole file.
+    """
+
+    file: str
+    version: tuple[int, int]
+    headers: Headers
+    content: bytes
+
+    def is_current(self) -> bool:
+        """Whether the file has been neither changed nor taken away."""
+        try:
+            return _version(Path(self.file).stat()) == self.version
+        except OSError:
+            return False
+
+
+class KeptFiles(StaticFiles):
+    """Files of a folder from memory; each is read anew when it has changed.
+
+    A page asks for some 200 at once.  Opened in threads for each request, they would
+    hold up the loop on which a STOP runs for twice as long.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(directory=folder)
+        self._kept: dict[str, _Kept] = {}
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        """A whole file from memory; any other answer is the framework's own."""
+        asked = Headers(scope=scope)
+        if scope["method"] != "GET" or "range" in asked:
+            return await super().get_response(path, scope)
+        kept = self._kept.get(path)
+        if kept is None or not kept.is_current():
+            kept = await to_thread.run_sync(self._read, path)
+        if kept is None:
+            return await super().get_response(path, scope)
+        self._kept[path] = kept
+        if self.is_not_modified(kept.headers, asked):
+            return NotModifiedResponse(kept.headers)
+        return Response(kept.content, headers=kept.headers)
+
+    def _read(self, path: str) -> _Kept | None:
+        """None for what is no file, or was just being written."""
+        try:
+            file, found = self.lookup_path(path)
+            if found is None or not S_ISREG(found.st_mode):
+                return None
+            content = Path(file).read_bytes()
+        except (OSError, ValueError):
+            return None
+        headers = FileResponse(file, stat_result=found).headers
+        is_whole = len(content) == found.st_size
+        return _Kept(file, _version(found), headers, content) if is_whole else None
+
+
+def _version(found: os.stat_result) -> tuple[int, int]:
+    return found.st_mtime_ns, found.st_size

@@ -8,8 +8,10 @@ from pydantic import TypeAdapter
 
 from iveg.adapters import clock
 from iveg.adapters.access_file import AccessFile
+from iveg.adapters.bounded_json import BoundedJson
 from iveg.adapters.extras import require_extra
 from iveg.adapters.files import FileByRobot
+from iveg.adapters.fiware_http import HOP, FiwareToken, TokenGrant
 from iveg.adapters.history.engine import history_url, sqlite_file
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, spilled_file
@@ -22,7 +24,6 @@ from iveg.adapters.orion import OrionClient
 from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import WriterSetup
 from iveg.adapters.rules import FileRules, FileTrials
-from iveg.app.fiware import open_fiware
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import OutOfService
 from iveg.domain.fleet import FleetDescription
@@ -193,3 +194,32 @@ def open_provider(settings: Settings) -> IdentityProvider | None:
     from iveg.adapters.oidc import OpenIdProvider
 
     return OpenIdProvider(client, clock.now)
+
+
+def open_fiware(settings: Settings) -> tuple[OrionClient, IotAgentClient]:
+    """Both, with one token where a proxy asks for it; nothing is connected yet.
+
+    Who closes one of them closes the other, too.
+    """
+    tenant = settings.fiware_service, settings.fiware_servicepath
+    access = open_token(settings)
+    return (
+        OrionClient(settings.orion_url, *tenant, access),
+        IotAgentClient(settings.iota_url, *tenant, access),
+    )
+
+
+def open_token(settings: Settings) -> FiwareToken | None:
+    """The token that a proxy asks for; None where the settings name no endpoint."""
+    if not settings.fiware_token_url:
+        return None
+    grant = TokenGrant(
+        settings.fiware_token_url,
+        settings.fiware_client_id,
+        settings.fiware_client_secret,
+        settings.fiware_user,
+        settings.fiware_password,
+        settings.fiware_scope,
+        settings.fiware_token_header,
+    )
+    return FiwareToken(grant, clock.mono, BoundedJson(HOP))

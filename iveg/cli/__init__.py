@@ -6,8 +6,8 @@ import sys
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
-from iveg.app.laboratory import find_laboratory
 from iveg.cli.arguments import (
     CommandCall,
     CommandWord,
@@ -87,3 +87,17 @@ COMMANDS = (
     ),
     CommandWord("user", "who may sign in", "iveg.cli.user", add_user),
 )
+
+
+def find_laboratory(part: str) -> ModuleType | None:
+    """A module of the laboratory by its name; None where there is no laboratory.
+
+    The one door: nothing of the product imports ``iveg.lab``, which an image lacks.
+    """
+    module = f"iveg.lab.{part}"
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name in ("iveg.lab", module):
+            return None
+        raise

@@ -20,7 +20,7 @@ from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.mqtt import publish_and_hear
 from iveg.adapters.reconciler import PREFIX, describe_failures, provision
-from iveg.app.fiware import open_fiware
+from iveg.app.outside import open_fiware
 from iveg.cli.arguments import CommandCall
 from iveg.cli.nodes import broker_of
 from iveg.cli.running import page_address, run_until_stopped

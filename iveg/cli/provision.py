@@ -5,7 +5,7 @@ import asyncio
 from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.reconciler import provision
-from iveg.app.fiware import open_fiware
+from iveg.app.outside import open_fiware
 from iveg.cli.arguments import CommandCall
 
 

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 from iveg.adapters import clock
 from iveg.adapters.fleet_files import load_fleet
-from iveg.app.fiware import open_fiware
+from iveg.app.outside import open_fiware
 from iveg.cli.arguments import CommandCall
 from iveg.cli.nodes import broker_of, node_settings
 from iveg.cli.running import LOOPBACK, run_until_stopped

@@ -77,7 +77,7 @@ def test_one_door_of_the_product_names_the_laboratory() -> None:
         if isinstance(node, ast.Constant) and str(node.value).startswith("iveg.lab")
     }
 
-    assert doors == {"iveg/app/laboratory.py"}
+    assert doors == {"iveg/cli/__init__.py"}
 
 
 def test_a_constructor_has_six_parameters_at_most_and_no_default_does_nothing() -> None:

@@ -35,7 +35,7 @@ pytestmark = [
         MOSQUITTO is None and "CI" not in os.environ, reason="Mosquitto is missing"
     ),
 ]
-WANTED = wanted_for()
+WANTED = wanted_for(scanned=("AGI", "AGII"))
 TENANT = {"Fiware-Service": "agroconnect", "Fiware-ServicePath": "/greenhouse"}
 Json = dict[str, Any]
 _PATIENT: Any = {"timeout": 30.0, "trust_env": False, "verify": NO_TLS}

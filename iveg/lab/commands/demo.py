@@ -15,7 +15,6 @@ from urllib.parse import urlsplit
 
 from iveg.adapters.equipment_files import DEMO
 from iveg.adapters.fleet_files import load_fleet
-from iveg.adapters.free_ports import bind_once
 from iveg.cli.arguments import CommandCall
 from iveg.cli.running import LOOPBACK, print_sign_in_link, run_until_stopped
 from iveg.domain.errors import SettingsError
@@ -134,3 +133,16 @@ async def _watch(name: str, process: asyncio.subprocess.Process) -> None:
     """Wait until a part ends; the others continue, as on a real site."""
     code = await process.wait()
     print(f"iveg: {name} has ended (exit code {code}).", file=sys.stderr, flush=True)
+
+
+def bind_once(host: str, port: int) -> int:
+    """Bind a port for a moment; returns it, or a free one for 0.
+
+    Raises:
+        OSError: it is taken, or the host is not of this machine.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        probe.bind((host, port))
+        return int(probe.getsockname()[1])

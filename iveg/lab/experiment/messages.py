@@ -26,7 +26,7 @@ from iveg.adapters.reconciler import (
     WantedSubscription,
     write_subscription,
 )
-from iveg.app.fiware import open_fiware
+from iveg.app.outside import open_fiware
 from iveg.cli.nodes import broker_of
 from iveg.domain.clock_offset import LONGEST_S, STAMP_S
 from iveg.domain.errors import HopError, UnreadableError

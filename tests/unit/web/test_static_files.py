@@ -9,7 +9,7 @@ from starlette.applications import Starlette
 from starlette.routing import Mount
 from starlette.staticfiles import StaticFiles
 
-from iveg.web.static_files import KeptFiles
+from iveg.asgi import KeptFiles
 
 Client = httpx.AsyncClient
 
