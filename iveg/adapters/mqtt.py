@@ -186,7 +186,8 @@ class MqttLink:
             on_loss: Called once when a connection is lost.
             on_stored: Called with what the broker retained; None: ``on_message`` is.
         """
-        self._subscriptions = (subscriptions, *apart)
+        # Orders leave by the last of these connections.
+        self._subscriptions = (*apart, subscriptions)
         self._on_message = on_message
         self._on_connect = on_connect
         self._on_loss = on_loss
@@ -229,29 +230,42 @@ class MqttLink:
 
     async def _session(self) -> None:
         files = self._address.files.state()
-        async with AsyncExitStack() as connections:
-            self._early.clear()
-            clients = []
-            for subscriptions in self._subscriptions:
-                client = await connections.enter_async_context(self._new_client())
-                for topic_filter, qos in subscriptions.items():
-                    await client.subscribe(topic_filter, qos=qos)
-                clients.append(client)
-            _heed_cancellation()
-            self._client = clients[0]
-            self._loss_told = False
-            self.connects += 1
-            _log.info("%s: connected to the broker", self._name)
-            self._on_connect()
-            sender = asyncio.create_task(
-                self._send_offered(clients[0]), name=f"mqtt-send-{self._name}"
-            )
-            try:
-                while self._early:
-                    self._hand_over(self._early.popleft())
-                await self._until_over(clients, files)
-            finally:
-                sender.cancel()
+        ends = list[asyncio.Future[None]]()
+        try:
+            async with AsyncExitStack() as connections:
+                self._early.clear()
+                for subscriptions in self._subscriptions:
+                    client = await connections.enter_async_context(self._new_client())
+                    ends.append(asyncio.ensure_future(_end_of(client)))
+                    for topic_filter, qos in subscriptions.items():
+                        await client.subscribe(topic_filter, qos=qos)
+                _heed_cancellation()
+                await self._serve(client, ends, files)
+        finally:
+            # Each hears of its own end, or asyncio complains of an error nobody took.
+            await asyncio.gather(*ends, return_exceptions=True)
+
+    async def _serve(
+        self,
+        client: aiomqtt.Client,
+        ends: Sequence[asyncio.Future[None]],
+        files: FileState,
+    ) -> None:
+        """Hand on and send, until a connection is lost or has to be made anew."""
+        self._client = client
+        self._loss_told = False
+        self.connects += 1
+        _log.info("%s: connected to the broker", self._name)
+        self._on_connect()
+        sender = asyncio.create_task(
+            self._send_offered(client), name=f"mqtt-send-{self._name}"
+        )
+        try:
+            while self._early:
+                self._hand_over(self._early.popleft())
+            await self._until_over(ends, files)
+        finally:
+            sender.cancel()
 
     def _new_client(self) -> aiomqtt.Client:
         address = self._address
@@ -270,28 +284,22 @@ class MqttLink:
         )
 
     async def _until_over(
-        self, clients: Sequence[aiomqtt.Client], files: FileState
+        self, ends: Sequence[asyncio.Future[None]], files: FileState
     ) -> None:
         """Until a connection is lost (MqttError), or its certificate is another."""
-        lost = [asyncio.ensure_future(_end_of(client)) for client in clients]
-        try:
-            while True:
-                done, _ = await asyncio.wait(
-                    lost,
-                    timeout=self._look_every_s,
-                    return_when=asyncio.FIRST_COMPLETED,
-                )
-                for one in done:
-                    return one.result()
-                now = self._address.files.state()
-                if now != files and self._can_connect():
-                    _log.info("%s: a new certificate: connecting anew", self._name)
-                    return None
-                files = now
-        finally:
-            for one in lost:
-                one.cancel()
-            await asyncio.gather(*lost, return_exceptions=True)
+        while True:
+            done, _ = await asyncio.wait(
+                ends,
+                timeout=self._look_every_s,
+                return_when=asyncio.FIRST_COMPLETED,
+            )
+            for end in done:
+                return end.result()
+            now = self._address.files.state()
+            if now != files and self._can_connect():
+                _log.info("%s: a new certificate: connecting anew", self._name)
+                return None
+            files = now
 
     def _can_connect(self) -> bool:
         """Whether the files fit together: half-written ones end no connection."""

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final, Literal
 
 from iveg.domain.comparison import Comparison
-from iveg.domain.limits import grown_radius
 from iveg.domain.parameters import PARAMETERS, Class, Parameters
 from iveg.domain.words import meaning_of, plain
 
@@ -102,10 +101,6 @@ class DetectionRule(Parameters):
         """Whether an encounter so soon (s) is within the horizon."""
         # Moments are sums of steps.
         return in_s <= self.foresight_s + 1e-6
-
-    def radius_at(self, age_s: float, class_: Class) -> float:
-        """The zone of a sighting of this class that is ``age_s`` old (m)."""
-        return grown_radius(self.radius_m.of(class_), age_s)
 
 
 def strictest(rules: Iterable[DetectionRule], since: float) -> DetectionRule:

@@ -11,7 +11,7 @@ import numpy as np
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.limits import LIMITS
+from iveg.domain.limits import LIMITS, grown_radius
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.people import People
@@ -99,9 +99,8 @@ def _zone_of_peer(
     at_rest = peer.stands and known is not None and known <= LIMITS.silence_s
     if at_rest or age > LIMITS.zone_lasts_s:
         return
-    pose, name, radius = peer.odometry.pose, peer.robot_id, rule.radius_at(age, "robot")
-    fresh_m = rule.radius_m.of("robot")
-    yield Zone("robot", name, name, pose.x, pose.y, radius, fresh_m)
+    pose, name, fresh_m = peer.odometry.pose, peer.robot_id, rule.radius_m.of("robot")
+    yield Zone("robot", name, name, pose.x, pose.y, grown_radius(fresh_m, age), fresh_m)
 
 
 class Distance(NamedTuple):

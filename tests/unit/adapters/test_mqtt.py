@@ -99,6 +99,20 @@ async def test_of_what_is_offered_while_away_the_newest_of_each_topic_arrives() 
     assert heard.link.replaced == 9
 
 
+async def test_connections_apart_come_and_go_together() -> None:
+    heard, lost, (port,) = list[str](), asyncio.Event(), free_ports(1)
+    link = MqttLink(BrokerAddress("127.0.0.1", port), "test")
+    apart = [{f"/{number}": 0} for number in range(5)]
+    link.attach({}, lambda topic, _: heard.append(topic), on_loss=lost.set, apart=apart)
+    async with running(link):
+        async with mqtt_broker("127.0.0.1", port):
+            await until(lambda: link.connected)
+            for number in range(5):
+                link.enqueue(f"/{number}", b"")
+            await until(lambda: len(heard) == 5)
+        await lost.wait()
+
+
 async def test_messages_at_qos_1_go_together_and_newer_ones_after_their_pubacks() -> (
     None
 ):

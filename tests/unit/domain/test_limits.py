@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.limits import LIMITS
+from iveg.domain.limits import LIMITS, grown_radius
 from iveg.domain.parameters import ByClass
 from iveg.robot.judgement import Limits
 from iveg.settings import Settings
@@ -22,7 +22,7 @@ RINGS = json.loads((ROOT / "tests/data/rings.json").read_text())
 def test_the_ring_law_gives_the_shared_cases(case: dict[str, float]) -> None:
     rule = DetectionRule(radius_m=ByClass(case["radius_m"]))
 
-    assert rule.radius_at(case["age_s"], "person") == pytest.approx(
+    assert grown_radius(rule.radius_m.of("person"), case["age_s"]) == pytest.approx(
         case["ring_m"], abs=1e-6
     )
 
