@@ -29,8 +29,8 @@ TICK_S = 0.05
 """Time passes, and the fleet is judged, at least so often (s)."""
 APART_S = 0.02
 """After news the fleet is judged at once, but at most so often (s)."""
-_SHARE = 5
-"""Taking has four times as long as judging, so that nothing waits for its turn."""
+_SHARE = 8
+"""Taking has seven times as long as judging, so that nothing waits for its turn."""
 _EARLY_S = 0.001
 _ANSWERS = (CommandAnswer, GoalAnswer)
 _HEALTH_PERIOD_S = 1.0
