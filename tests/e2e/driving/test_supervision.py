@@ -236,14 +236,10 @@ def test_a_goal_is_the_tap_after_its_button_and_a_plain_tap_is_none(
         let_go(page, stack, "AGI")
         until(is_asked, "the page asks for a place")
 
-    def is_ended() -> bool:
-        """The key closes first a panel that is still open."""
-        page.keyboard.press("Escape")
-        return not sending.is_visible()
-
     tap(place)
     ask_for_a_place()
-    until(is_ended, "no place is asked for")
+    page.keyboard.press("Escape")
+    expect(sending).to_be_hidden()
     tap(place)
     ask_for_a_place()
     tap({"x": -1.5, "y": 10.0})
