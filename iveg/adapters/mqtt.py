@@ -1,4 +1,4 @@
-"""MQTT: one connection that reconnects by itself.
+"""MQTT: a link of one connection or more that reconnects by itself.
 
 ``run`` connects, subscribes and hands every message on as it is read; when the broker
 goes it tries again with a growing, jittered pause.  ``publish`` waits for the broker's

@@ -88,7 +88,7 @@ class Kind:
         changes: Live topic that is new with it; those of detections depend on what is
             seen, those of a command on the machine.
         direct: From which scope on it is read straight from MQTT; ``off`` never.
-        qos: There.  At 0 the inbox keeps the newest of a topic alone.
+        qos: There.
         apart_s: There, least time between two of a robot that are read (s).
         vital: Whether a STOP or a speed limit may rest on it.
         sensor: What is shown and kept of it, for a small sensor.

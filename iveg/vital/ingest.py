@@ -154,11 +154,10 @@ class Ingest:
 
     def is_early(self, robot_id: str, kind: type[Observation], now: float) -> bool:
         """Whether nobody would look at it: one of its kind was read a moment ago."""
-        apart_s = KIND_OF[kind].apart_s
-        if apart_s and now < self._due.get((robot_id, kind), 0.0):
-            return True
-        self._due[robot_id, kind] = now + apart_s
-        return False
+        due = self._due.get((robot_id, kind), 0.0)
+        if now >= due:
+            self._due[robot_id, kind] = now + KIND_OF[kind].apart_s
+        return now < due
 
     def reject(self, source: str, reason: str, detail: str = "") -> None:
         """Count something that cannot be used; say so once for each source."""

@@ -34,7 +34,7 @@ BYTES: Final = 24_576
 GAP_S: Final = 0.002
 """Frames nearer to each other would cost more than the freshness that they bring."""
 ROBOT_GAP_S: Final = 0.0006
-"""Gap for each robot of the fleet, where that is more: 4 ms with twenty."""
+"""Gap for each robot of the fleet, where that is more: 6 ms with ten."""
 SLOW_FRAME_S: Final = 0.03
 """A page that draws for longer than this twice is slow."""
 
