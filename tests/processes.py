@@ -40,7 +40,7 @@ T = TypeVar("T")
 
 
 def until(probe: Callable[[], T | None], what: str, within_s: float = PATIENCE_S) -> T:
-    """Ask again and again until there is an answer; the answer.
+    """Ask again and again until the answer is true; the answer.
 
     Raises:
         AssertionError: none came within ``within_s``; says ``what`` was missing.
@@ -48,8 +48,7 @@ def until(probe: Callable[[], T | None], what: str, within_s: float = PATIENCE_S
     pause = threading.Event()
     deadline = time.monotonic() + within_s
     while time.monotonic() < deadline:
-        answer = probe()
-        if answer is not None and answer is not False:
+        if answer := probe():
             return answer
         pause.wait(0.05)
     raise AssertionError(f"not within {within_s:g} s: {what}")

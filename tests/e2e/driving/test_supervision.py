@@ -222,7 +222,7 @@ def test_a_goal_is_the_tap_after_its_button_and_a_plain_tap_is_none(
         page.locator("#map").click(position={"x": x, "y": y})
 
     def is_asked() -> bool:
-        """Not of a robot whose report is old at the moment of the click."""
+        # Not of a robot whose report is old at the moment of the click.
         open_menu(page, "AGI")
         here = card(page, "AGI").locator('dialog [data-goal="here"]')
         with suppress(sync_api.Error, AssertionError):
@@ -251,6 +251,7 @@ def test_a_goal_is_the_tap_after_its_button_and_a_plain_tap_is_none(
         ask_for_a_place()
         tap(place)
         with suppress(AssertionError):
+            # A tap counts when it cannot be the first of two any more.
             until(given, "the goal is given", 10.0)
         return given() != {}
 
