@@ -189,7 +189,6 @@ def _paced(desk: WebDesk) -> Any:
         subscriber.changed(topic)
     painting = Painting(desk.latency)
     feed = TelemetryFeed(desk.encoder.telemetry, subscriber, painting)
-    feed.write_ahead(desk.clock())
     return _read(feed.next_frame(desk.clock()))
 
 

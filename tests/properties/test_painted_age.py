@@ -15,7 +15,7 @@ SETTLED = 6.0
 STEP = 0.001
 
 
-def oldest_painted(frame_s: float, round_trip_s: float, within: float | None) -> float:
+def oldest_painted(frame_s: float, round_trip_s: float) -> float:
     """The greatest age of what is on the screen, just after it was painted (s)."""
     window = CreditWindow()
     on_the_way: list[tuple[float, int, float]] = []
@@ -25,10 +25,10 @@ def oldest_painted(frame_s: float, round_trip_s: float, within: float | None) ->
     for tick in range(int(SECONDS / STEP)):
         now = tick * STEP
         while answers and answers[0][0] <= now:
-            window.painted(answers.pop(0)[1], now, within)
+            window.painted(answers.pop(0)[1], now)
         if window.opens_at <= now:
             on_the_way.append((now + round_trip_s / 2, window.next_number, now))
-            window.sent(0, now)
+            window.sent(now)
         if now < next_paint:
             continue
         next_paint += frame_s
@@ -46,12 +46,10 @@ def oldest_painted(frame_s: float, round_trip_s: float, within: float | None) ->
 @given(
     st.floats(min_value=0.004, max_value=0.4),
     st.floats(min_value=0.0, max_value=0.6),
-    st.booleans(),
 )
 def test_what_is_painted_is_no_older_than_two_frames_and_the_round_trip(
-    frame_s: float, round_trip_s: float, says_so: bool
+    frame_s: float, round_trip_s: float
 ) -> None:
     bound = 2 * frame_s + round_trip_s + STEP
 
-    within = round_trip_s / 2 if says_so else None
-    assert oldest_painted(frame_s, round_trip_s, within) <= bound
+    assert oldest_painted(frame_s, round_trip_s) <= bound

@@ -6,16 +6,16 @@ times a second cannot be read.
 
 Buffers of the kernel, of the server and of the browser are queues without a size, and
 telemetry that waits in them shows the past.  So the page says which frame it has
-painted, and no more than a window of unpainted frames is ever sent: further changes
-wait in slots, where the newest wins.  The same reports tell Δt₄, from the decision to
-the drawn frame.  Only frames that the server sent itself are measured, so a page can be
-wrong about the moment alone; an impossible moment is not used.
+painted, and a few unpainted frames at most are on their way: further changes wait in
+slots, where the newest wins.  The same reports tell Δt₄, from the decision to the drawn
+frame.  Only frames that the server sent itself are measured, so a page can be wrong
+about the moment alone; an impossible moment is not used.
 """
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping
-from typing import Final, NamedTuple
+from collections.abc import Mapping
+from typing import Final
 
 from iveg.domain.latency import Data, LatencyWatch
 from iveg.domain.observations import Instant
@@ -27,40 +27,23 @@ from iveg.web.presses import read_number
 SUBPROTOCOL: Final = "iveg.2"
 """A browser asks for paced telemetry by this WebSocket subprotocol."""
 
-FRAMES: Final = 8
-"""Spread over the round trip: 300 ms away a page still gets 26 frames a second."""
-BYTES: Final = 24_576
-"""Heavy content in them (scans, detections, people): 0.2 s of a line of 1 Mbit/s."""
-GAP_S: Final = 0.002
+FRAMES: Final = 3
+"""Unpainted frames on their way: one alone would add a round trip to every age."""
+GAP_S: Final = 0.005
 """Frames nearer to each other would cost more than the freshness that they bring."""
-ROBOT_GAP_S: Final = 0.0006
-"""Gap for each robot of the fleet, where that is more: 6 ms with ten."""
-SLOW_FRAME_S: Final = 0.03
-"""A page that draws for longer than this twice is slow."""
 
 _LEARNS: Final = 0.5
 
 
-class _Sent(NamedTuple):
-    number: int
-    heavy: int
-    at: float
-
-
 class CreditWindow:
-    """The frames that one page has not painted yet; times are monotonic (s).
-
-    Attributes:
-        gap_s: Least time between two frames.
-    """
+    """The frames that one page has not painted yet; times are monotonic (s)."""
 
     def __init__(self) -> None:
-        self.gap_s = GAP_S
-        self._sent: deque[_Sent] = deque()
+        self._unpainted: deque[tuple[int, float]] = deque()
+        """Number of each, and when it was sent."""
         self._number = 0
         self._sent_at = float("-inf")
         self._round_trip_s = 0.0
-        self._line_s: float | None = None
 
     @property
     def next_number(self) -> int:
@@ -69,58 +52,33 @@ class CreditWindow:
 
     @property
     def opens_at(self) -> float:
-        """When the next frame may go; ``inf``: not before one is painted."""
-        if len(self._sent) >= FRAMES:
-            return float("inf")
-        return self._sent_at + (self._apart_s if self._sent else self.gap_s)
+        """When the next frame may go; ``inf``: not before one is painted.
 
-    @property
-    def _apart_s(self) -> float:
-        """Between frames of which none is painted (s).
-
-        Many on a long line, so that it is used; two while a page draws that takes
-        longer than screens do: more would only keep it from drawing.
+        Frames are spread over the round trip; together they would all be as old.
         """
-        if self._line_s is None:
-            return max(self.gap_s, self._round_trip_s / FRAMES)
-        half_s = (self._round_trip_s - self._line_s) / 2
-        draws_s = half_s if half_s > SLOW_FRAME_S else 0.0
-        return max(self.gap_s, self._line_s / FRAMES, draws_s)
+        if len(self._unpainted) >= FRAMES:
+            return float("inf")
+        spread_s = self._round_trip_s / FRAMES if self._unpainted else 0.0
+        return self._sent_at + max(GAP_S, spread_s)
 
-    @property
-    def room(self) -> int:
-        """Number of heavy bytes that may go with it."""
-        return BYTES - sum(one.heavy for one in self._sent)
-
-    def sent(self, heavy: int, now: float) -> None:
-        """One more frame is on its way, ``heavy`` bytes of it heavy."""
+    def sent(self, now: float) -> None:
+        """One more frame is on its way."""
         self._number += 1
         self._sent_at = now
-        self._sent.append(_Sent(self._number, heavy, now))
+        self._unpainted.append((self._number, now))
 
-    def painted(self, number: object, now: float, within: object = None) -> bool:
-        """The page has painted this frame and all before; whether that was news.
-
-        ``within``, in its own words, is half its shortest round trip (s).
-        """
+    def painted(self, number: object, now: float) -> bool:
+        """The page has painted this frame and all before; whether that was news."""
         if type(number) is not int or number > self._number:
             return False
-        if not self._sent or number < self._sent[0].number:
+        if not self._unpainted or number < self._unpainted[0][0]:
             return False
         # The oldest of them says how long the credit has been out.
-        away_s = now - self._sent[0].at
+        away_s = now - self._unpainted[0][1]
         self._round_trip_s += _LEARNS * (away_s - self._round_trip_s)
-        while self._sent and self._sent[0].number <= number:
-            self._sent.popleft()
-        half_s = _bounded(within, self._round_trip_s / 2)
-        self._line_s = None if half_s is None else 2 * half_s
+        while self._unpainted and self._unpainted[0][0] <= number:
+            self._unpainted.popleft()
         return True
-
-
-def _bounded(value: object, most: float) -> float | None:
-    """A time that a page has sent; None where it is none, or longer than possible."""
-    number = read_number(value)
-    return number if number is not None and 0.0 <= number <= most else None
 
 
 TRUSTED_S: Final = 0.1
@@ -217,15 +175,9 @@ class TelemetryFeed:
         self._subscriber = subscriber
         self._moved: dict[str, None] = {}
         """Robots, by topic; their positions go with each frame."""
-        self._robots: set[str] = set()
-        """All that have ever moved, by topic."""
-        self._read_outs: dict[str, float] = {}
-        self._pictures: dict[str, float] = {}
-        """Changed topics, and when each may be sent (monotonic, s)."""
+        self._waiting: dict[str, float] = {}
+        """Other changed topics, and when each may be sent (monotonic, s)."""
         self._sent: dict[str, tuple[int, float]] = {}
-        self._is_full = False
-        self._ready: _Frame | None = None
-        """Begun for the next frame."""
 
     def painted(self, number: object, now: float, report: dict[str, object]) -> None:
         """The page has painted a frame: there may be credit for another.
@@ -233,10 +185,8 @@ class TelemetryFeed:
         ``report``, all in its own words: ``at`` and ``within`` (s) are when; without
         ``at`` it drew nothing.
         """
-        within = report.get("within")
-        if type(number) is int and self.window.painted(number, now, within):
-            self._painting.painted(number, report.get("at"), within, now)
-            self._is_full = False
+        if type(number) is int and self.window.painted(number, now):
+            self._painting.painted(number, report.get("at"), report.get("within"), now)
             self._subscriber.wake()
 
     def wait_s(self, now: float) -> float | None:
@@ -251,112 +201,67 @@ class TelemetryFeed:
         return None if wake_at == _INF else max(0.0, wake_at - now)
 
     def next_frame(self, now: Instant) -> bytes | None:
-        """A frame of what moved, was written ahead or is a picture; None: not now."""
+        """A frame of all that moved and all that is due; None: not now."""
         if self.window.opens_at > now.mono:
             return None
         self._absorb()
-        frame = self._begun()
-        self._add_moves(frame, now)
-        # People and states before pictures, where there is no room for all.
-        if self._ready is None:
-            self._add_due(frame, self._pictures, now)
-        self._is_full = frame.is_full
-        if frame.is_empty:
-            return None
-        data = frame.write(self.window.next_number)
-        self._painting.sent(self.window.next_number, now.mono)
-        self.window.sent(frame.heavy, now.mono)
-        return data
-
-    def write_ahead(self, now: Instant) -> None:
-        """Write the read-outs that are due, for the next frame.
-
-        They take long to write, and poses must not wait for that.
-        """
-        if self._ready is not None or self.window.opens_at == _INF:
-            return
-        self._absorb()
         self._encoder.begin()
-        ready = _Frame(BYTES)
-        self._add_due(ready, self._read_outs, now)
-        self._ready = None if ready.is_empty else ready
-
-    def _begun(self) -> "_Frame":
-        """The frame that was written ahead, once there is room for it; else a new one.
-
-        Where it waits, so does all that is heavy.
-        """
-        room, ready = self.window.room, self._ready
-        if ready is None:
-            return _Frame(room)
-        if ready.heavy <= room or room == BYTES:
-            self._ready = None
-            return ready
-        waits = _Frame(0)
-        waits.is_full = True
-        return waits
+        moves, parts = self._moves(now), self._due_parts(now)
+        if not moves and not parts:
+            return None
+        data = _write(self.window.next_number, moves, parts)
+        self._painting.sent(self.window.next_number, now.mono)
+        self.window.sent(now.mono)
+        return data
 
     def _absorb(self) -> None:
         for topic in self._subscriber.drain_telemetry():
             row, robot_id = topics.find(topic)
             if row is topics.ROBOT:
                 self._moved[topic] = None
-                self._robots.add(topic)
-                self._note(
-                    self._read_outs, topics.ROBOT_STATE.of(robot_id), _next_state
-                )
-            elif row.pace == "read-out":
-                self._note(self._read_outs, topic, self._next_list)
-            else:
-                self._note(self._pictures, topic, _next_picture)
-        self.window.gap_s = max(GAP_S, ROBOT_GAP_S * len(self._robots))
+                topic = topics.ROBOT_STATE.of(robot_id)
+            if topic not in self._waiting:
+                self._waiting[topic] = self._next_at(topic)
 
-    def _note(
-        self,
-        waiting: dict[str, float],
-        topic: str,
-        next_after: Callable[[float], float],
-    ) -> None:
-        if topic not in waiting:
-            sent = self._sent.get(topic)
-            waiting[topic] = -_INF if sent is None else next_after(sent[1])
-
-    def _next_list(self, sent_at: float) -> float:
-        """When a list of people may be sent again (monotonic, s)."""
-        return _next_beat(sent_at + self._encoder.lists_apart_s - LIST_S, LIST_S)
+    def _next_at(self, topic: str) -> float:
+        """When a topic may be sent again (monotonic, s)."""
+        if topic not in self._sent:
+            return -_INF
+        row, sent_at = topics.find(topic)[0], self._sent[topic][1]
+        if row is topics.ROBOT_STATE:
+            return _next_beat(sent_at - STATES_AFTER_S, STATE_S) + STATES_AFTER_S
+        if row is topics.PEOPLE:
+            return _next_beat(sent_at + self._encoder.lists_apart_s - LIST_S, LIST_S)
+        return sent_at + PICTURE_S
 
     def _due_at(self) -> float:
-        """Earliest time of a waiting part; parts without room wait for credit."""
-        if self._moved:
-            return -_INF
-        if self._is_full:
-            return _INF
-        if self._ready is not None:
-            return -_INF
-        parts = min(self._read_outs.values(), default=_INF)
-        return min(parts, min(self._pictures.values(), default=_INF))
+        """Earliest time at which something that waits may go."""
+        return -_INF if self._moved else min(self._waiting.values(), default=_INF)
 
-    def _add_moves(self, frame: "_Frame", now: Instant) -> None:
+    def _moves(self, now: Instant) -> list[bytes]:
+        moves = []
         for topic in self._moved:
             move = self._encoder.move(topics.find(topic)[1], now)
             if move is not None and move.version != self._version(topic):
-                frame.moves.append(move.head)
-                self._sent[topic] = move.version, now.mono
-                self._painting.adds(topic, now.mono)
+                moves.append(move.head)
+                self._note_sent(topic, move, now)
         self._moved.clear()
+        return moves
 
-    def _add_due(
-        self, frame: "_Frame", waiting: dict[str, float], now: Instant
-    ) -> None:
-        for topic in [one for one, due in waiting.items() if due <= now.mono]:
+    def _due_parts(self, now: Instant) -> list[Part]:
+        parts = []
+        for topic in [name for name, due in self._waiting.items() if due <= now.mono]:
+            del self._waiting[topic]
             version = self._version(topic)
             part = self._part(topic, version, now)
-            if part is None or part.version == version:
-                del waiting[topic]
-            elif frame.add(part):
-                del waiting[topic]
-                self._sent[topic] = part.version, now.mono
-                self._painting.adds(topic, now.mono)
+            if part is not None and part.version != version:
+                parts.append(part)
+                self._note_sent(topic, part, now)
+        return parts
+
+    def _note_sent(self, topic: str, part: Part, now: Instant) -> None:
+        self._sent[topic] = part.version, now.mono
+        self._painting.adds(topic, now.mono)
 
     def _version(self, topic: str) -> int:
         sent = self._sent.get(topic)
@@ -371,50 +276,16 @@ class TelemetryFeed:
         return self._encoder.part(topic, now)
 
 
-class _Frame:
-    """One frame in the making."""
-
-    def __init__(self, room: int) -> None:
-        self._room = room
-        self.moves: list[bytes] = []
-        self._parts: list[bytes] = []
-        self._scans: list[Part] = []
-        self.heavy = 0
-        self.is_full = False
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether the frame has no content."""
-        return not (self.moves or self._parts or self._scans)
-
-    def add(self, part: Part) -> bool:
-        """Add a part; False where too much would be on its way at once."""
-        # One that is larger than all room goes when nothing heavy is on its way.
-        is_first = self._room == BYTES and self.heavy == 0
-        if self.heavy + part.size > self._room and not is_first:
-            self.is_full = True
-            return False
-        self.heavy += part.size
-        if part.body:
-            self._scans.append(part)
-        else:
-            self._parts.append(part.head)
-        return True
-
-    def write(self, number: int) -> bytes:
-        """The frame as it is sent."""
-        head = b'{"frame":%d,"parts":[%b],"moves":[%b],"scans":[%b]}' % (
-            number,
-            b",".join(self._parts),
-            b",".join(self.moves),
-            b",".join(scan.head for scan in self._scans),
-        )
-        return write_frame(head, (scan.body for scan in self._scans))
-
-
-def _next_picture(sent_at: float) -> float:
-    """When a scan or a detection frame may be sent again (monotonic, s)."""
-    return sent_at + PICTURE_S
+def _write(number: int, moves: list[bytes], parts: list[Part]) -> bytes:
+    """The frame as it is sent; what has a body is a scan."""
+    scans = [part for part in parts if part.body]
+    head = b'{"frame":%d,"parts":[%b],"moves":[%b],"scans":[%b]}' % (
+        number,
+        b",".join(part.head for part in parts if not part.body),
+        b",".join(moves),
+        b",".join(scan.head for scan in scans),
+    )
+    return write_frame(head, (scan.body for scan in scans))
 
 
 def _next_beat(sent_at: float, apart_s: float) -> float:
@@ -424,8 +295,3 @@ def _next_beat(sent_at: float, apart_s: float) -> float:
     all robots and people is worked out once for all of them.
     """
     return (math.floor(sent_at / apart_s + 1e-6) + 1) * apart_s
-
-
-def _next_state(sent_at: float) -> float:
-    """When the state of a robot may be sent again (monotonic, s)."""
-    return _next_beat(sent_at - STATES_AFTER_S, STATE_S) + STATES_AFTER_S

@@ -172,7 +172,6 @@ class Line:
             self._sending_since = loop.time()
             await self._send_frame(feed)
             await self._send_news()
-            feed.write_ahead(self._clock())
         await self.close_slow()
 
     @property

@@ -56,11 +56,6 @@ class Part(NamedTuple):
     head: bytes
     body: bytes = b""
 
-    @property
-    def size(self) -> int:
-        """In bytes."""
-        return len(self.head) + len(self.body)
-
 
 class TelemetryEncoder:
     """Encodes each part when the first browser asks for it."""

@@ -8,14 +8,7 @@ import numpy as np
 import orjson
 import pytest
 
-from iveg.web.live.feed import (
-    BYTES,
-    FRAMES,
-    GAP_S,
-    ROBOT_GAP_S,
-    Painting,
-    TelemetryFeed,
-)
+from iveg.web.live.feed import FRAMES, GAP_S, Painting, TelemetryFeed
 from iveg.web.live.telemetry import NO_RETURN, UNIT_M
 from tests.builders import detection, scan
 from tests.unit.web.desk import WebDesk
@@ -38,10 +31,8 @@ class Page:
         )
 
     def read(self) -> dict[str, Any] | None:
-        """The next frame, if there may be one now; then as a browser's line does."""
+        """The next frame, if there may be one now."""
         frame = self.feed.next_frame(self.desk.clock())
-        self.feed.write_ahead(self.desk.clock())
-        frame = frame or self.feed.next_frame(self.desk.clock())
         if frame is None:
             return None
         (length,) = struct.unpack_from("<I", frame)
@@ -58,7 +49,7 @@ class Page:
         """All that is known now, each frame painted at once."""
         while self.read() is not None:
             self.paint()
-            self.desk.clock.now += 1.01 * self.feed.window.gap_s
+            self.desk.clock.now += 1.01 * GAP_S
 
     def told(self, member: str) -> list[Any]:
         """All that frames told under a member."""
@@ -105,49 +96,18 @@ def test_however_much_has_changed_a_frame_tells_of_each_robot_once() -> None:
     assert {move[3] for move in page.told("moves")} == {4.0}
 
 
-def _page_of_many_scans() -> Page:
-    """A page whose first frame is full of a fleet's scans."""
-    desk = WebDesk(MANY)
-    page = Page(desk)
-    for robot_id in MANY:
-        desk.drive(robot_id)
-        desk.hear(_wide_scan(desk, robot_id))
-    page.read()
-    return page
-
-
-def test_heavy_parts_on_their_way_are_bounded_and_go_on_in_turn() -> None:
-    page = _page_of_many_scans()
-    page.desk.clock.now += 1.0
-    page.read()
-    unpainted = sum(map(len, page.bodies))
-    page.paint()
-    page.read_all()
-
-    assert unpainted <= BYTES
-    told = [one["robot_id"] for one in page.told("scans")]
-    assert sorted(told) == sorted(MANY)
-
-
-@pytest.mark.parametrize(("robots", "gap_s"), [(2, GAP_S), (20, 20 * ROBOT_GAP_S)])
-def test_the_more_robots_the_more_of_them_share_a_frame(
-    robots: int, gap_s: float
-) -> None:
-    fleet = MANY[:robots]
-    desk = WebDesk(fleet)
-    page = Page(desk)
-    for robot_id in fleet:
-        desk.drive(robot_id)
+def test_changes_within_a_gap_share_a_frame(desk: WebDesk, page: Page) -> None:
+    desk.drive("AGI")
     page.read()
     page.paint()
-    desk.drive(fleet[0], 1.0)
+    desk.drive("AGI", 1.0)
 
-    assert page.feed.wait_s(desk.clock().mono) == pytest.approx(gap_s)
+    assert page.feed.wait_s(desk.clock().mono) == pytest.approx(GAP_S)
     assert page.read() is None
-    desk.drive(fleet[0], 2.0)
-    desk.clock.now += gap_s + 1e-6
+    desk.drive("AGI", 2.0)
+    desk.clock.now += GAP_S + 1e-6
     page.read()
-    assert [move[3] for move in page.told("moves")] == [0.0] * robots + [2.0]
+    assert [move[3] for move in page.told("moves")] == [0.0, 2.0]
 
 
 def test_without_credit_a_change_wakes_nobody(desk: WebDesk, page: Page) -> None:
@@ -244,11 +204,6 @@ def test_a_scan_is_ranges_in_integers_finer_than_a_centimetre(
         units[counts] * UNIT_M, told.ranges[counts], atol=UNIT_M / 2 + 1e-6
     )
     assert len(page.bodies[0]) % 4 == 0
-
-
-def _wide_scan(desk: WebDesk, robot_id: str, beams: int = 720) -> Any:
-    ranges = np.linspace(1.0, 9.0, beams, dtype=np.float32)
-    return scan(robot_id=robot_id, origin=desk.next_origin(), ranges=ranges)
 
 
 def test_f60_a_scan_that_cannot_be_written_is_refused_and_all_else_is_told(

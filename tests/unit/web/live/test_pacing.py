@@ -2,16 +2,16 @@
 
 import pytest
 
-from iveg.web.live.feed import BYTES, FRAMES, GAP_S, CreditWindow
+from iveg.web.live.feed import FRAMES, GAP_S, CreditWindow
 
 NOW = 1000.0
 
 
-def filled(count: int = FRAMES, heavy: int = 0) -> CreditWindow:
+def filled(count: int = FRAMES) -> CreditWindow:
     """A window with that many frames on their way, all sent now."""
     window = CreditWindow()
     for _ in range(count):
-        window.sent(heavy, NOW)
+        window.sent(NOW)
     return window
 
 
@@ -21,12 +21,11 @@ def test_a_page_that_paints_nothing_gets_one_window_and_no_more() -> None:
     assert window.opens_at == float("inf")
 
 
-def test_what_is_painted_makes_room_for_as_much() -> None:
-    window = filled(FRAMES, heavy=BYTES // FRAMES)
+def test_what_is_painted_makes_room() -> None:
+    window = filled(FRAMES)
 
-    assert window.painted(3, NOW + 0.02)
+    assert window.painted(1, NOW + 0.02)
 
-    assert window.room == 3 * (BYTES // FRAMES)
     assert window.opens_at < float("inf")
 
 
@@ -49,11 +48,11 @@ def test_what_is_painted_opens_the_window_at_once_with_a_little_between_frames()
 def test_over_a_long_round_trip_the_window_is_spread_and_not_sent_in_one_go() -> None:
     window, now = CreditWindow(), NOW
     for number in range(1, 30):
-        window.sent(0, now)
+        window.sent(now)
         window.painted(number, now + 0.3)
         now += 1.0
 
-    window.sent(0, now)
+    window.sent(now)
 
     assert window.opens_at - now == pytest.approx(0.3 / FRAMES, rel=0.01)
 

@@ -15,7 +15,7 @@ from websockets.typing import Subprotocol
 from iveg.domain.observations import Climate
 from iveg.domain.parameters import ByClass
 from iveg.vital.publish import MAX_PENDING
-from iveg.web.live.feed import BYTES, FRAMES, SUBPROTOCOL, Painting, TelemetryFeed
+from iveg.web.live.feed import FRAMES, SUBPROTOCOL, Painting, TelemetryFeed
 from iveg.web.live.socket import Line
 from iveg.web.security.roles import Role
 from tests.builders import detection, scan
@@ -31,7 +31,6 @@ class Browser:
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
         self.telemetry: list[Any] = []
-        self.bytes = 0
 
     async def read(self) -> Any:
         """The next message that is no telemetry."""
@@ -39,7 +38,6 @@ class Browser:
             while isinstance(message := await self.socket.recv(), bytes):
                 end = 4 + int.from_bytes(message[:4], "little")
                 self.telemetry.append(orjson.loads(message[4:end]))
-                self.bytes += len(message)
         return orjson.loads(message)
 
     async def read_until(self, topic: str) -> list[Any]:
@@ -162,7 +160,6 @@ async def test_a_page_that_never_answers_gets_one_window_and_everything_else() -
     topic = f"commands/{command.command_id}"
     steps = [one["data"]["state"] for one in told if one["topic"] == topic]
     assert [one["frame"] for one in browser.telemetry] == list(range(1, FRAMES + 1))
-    assert browser.bytes <= 2 * BYTES
     assert lines == [line.id for line in list(desk.event_log.lines)[before:]]
     assert steps == ["REQUESTED", "SENT", "DELIVERED"]
 
