@@ -292,7 +292,7 @@ class Scan(Model):
 class Costmap(Model):
     """Cells from the south-western corner, row by row: 0-100, -1 unknown.
 
-    All robots' scans, with the rings of people and moving peers laid over; or what one
+    All robots' scans, with the zones of people and moving peers laid over; or what one
     robot believes: its own scans, and the people and peers of whom feedback told it.
 
     Attributes:
@@ -332,7 +332,7 @@ class LaneCoverage(Area):
 class Coverage(Model):
     """When a camera last looked at each cell of the aisles.
 
-    A camera looks where it would take a ring away: LIVE, within three quarters of its
+    A camera looks where it would take a zone away: LIVE, within three quarters of its
     reach, nothing in between.
 
     Attributes:

@@ -89,7 +89,7 @@ SMALLEST_STOP = """() => Math.min(...[...document.querySelectorAll(
 """The shorter side of the smallest STOP of the strip (px); 0 without any."""
 
 
-ON_SCREEN = """async ([rings, robots]) => {
+ON_SCREEN = """async ([zones, robots]) => {
   const {createViewport, fitTo, screenX, screenY} =
     await import('/static/js/map/viewport.js');
   const {coverOf} = await import('/static/js/map/layers/scalebar.js');
@@ -104,9 +104,9 @@ ON_SCREEN = """async ([rings, robots]) => {
   const covers = [...over, coverOf({height})];
   const view = fitTo(createViewport(width, height), bounds, undefined, covers);
   const place = ({x, y}) => [screenX(view, x), screenY(view, y)];
-  const far = (ring) => robots.every(({x, y}) =>
-    Math.hypot(x - ring.x, y - ring.y) * view.scale > 30);
-  return rings.filter(far).map(place).find(([x, y]) =>
+  const far = (zone) => robots.every(({x, y}) =>
+    Math.hypot(x - zone.x, y - zone.y) * view.scale > 30);
+  return zones.filter(far).map(place).find(([x, y]) =>
     x > 0 && y > 0 && x < width && y < height) ?? null;
 }"""
-"""Where the first of some rings is, with the code that the map itself is drawn by."""
+"""Where the first of some zones is, with the code that the map itself is drawn by."""

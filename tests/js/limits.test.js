@@ -3,19 +3,19 @@ import { equal, near, test } from "./harness.js";
 
 const RINGS = await (await fetch("/tests/data/rings.json")).json();
 
-test("the ring's law gives the cases that the server's gives", () => {
+test("the zone's law gives the cases that the server's gives", () => {
   equal(RINGS.length > 50, true);
   for (const { radius_m, age_s, ring_m } of RINGS)
     near(zoneRadius(radius_m, age_s), ring_m, 1e-6);
 });
 
-test("a ring that goes on growing here ends where the server's would", () => {
+test("a zone that goes on growing here ends where the server's would", () => {
   const atTwo = zoneRadius(2, 2);
 
   near(zoneRadius(atTwo, 2.5, 2), zoneRadius(2, 2.5));
 });
 
-test("a ring never shrinks, even if an age runs backwards", () => {
+test("a zone never shrinks, even if an age runs backwards", () => {
   near(zoneRadius(4, 1, 3), 4);
 });
 

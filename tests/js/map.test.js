@@ -111,7 +111,7 @@ test("a double tap follows a robot through a zoom, and a drag lets it go", async
   map.destroy();
 });
 
-test("a tap in a ring picks its person, on the robot the robot", async () => {
+test("a tap in a zone picks its person, on the robot the robot", async () => {
   const { canvas, store, map } = mapOnPage();
   const people = [person({ position: { x: 14, y: 5, z: 1 } })];
   store.apply("snapshot", snapshot({ people, robots: [robot()] }));

@@ -20,11 +20,11 @@ test("a robot without a word becomes a ghost at its last pose", () => {
   equal(readScene(store, 4000).robots[0].pose, { x: 1, y: 2, yaw: 0 });
 });
 
-test("a remembered person's ring grows at walking speed up to six metres", () => {
+test("a remembered person's zone grows at walking speed up to six metres", () => {
   const left = { ...person({ stage: "remembered", age_s: 1.32, radius_m: 3.6 }) };
-  near(readPerson({ ...left, receivedAtMs: 0 }, 0).ringM, 3.6);
-  near(readPerson({ ...left, receivedAtMs: 0 }, 1000).ringM, 5.2);
-  near(readPerson({ ...left, receivedAtMs: 0 }, 5000).ringM, 6);
+  near(readPerson({ ...left, receivedAtMs: 0 }, 0).zoneM, 3.6);
+  near(readPerson({ ...left, receivedAtMs: 0 }, 1000).zoneM, 5.2);
+  near(readPerson({ ...left, receivedAtMs: 0 }, 5000).zoneM, 6);
 });
 
 test("without news a seen person becomes remembered, then last seen", () => {
@@ -33,12 +33,12 @@ test("without news a seen person becomes remembered, then last seen", () => {
   equal(stages, ["seen", "remembered", "last_seen"]);
 });
 
-test("somebody whose place was seen to be empty has no ring that grows", () => {
+test("somebody whose place was seen to be empty has no zone that grows", () => {
   const checked = person({ stage: "remembered", age_s: 3, radius_m: null });
 
   const scene = readPerson({ ...checked, receivedAtMs: 0 }, 5000);
 
-  equal([scene.stage, scene.ringM], ["last_seen", 0]);
+  equal([scene.stage, scene.zoneM], ["last_seen", 0]);
 });
 
 test("a stop that nobody confirmed widens with the last known speed", () => {

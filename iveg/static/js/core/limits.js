@@ -14,7 +14,7 @@
 export const LIMITS = Object.freeze(JSON.parse(document.body.dataset.limits ?? ""));
 
 /**
- * Radius of a ring at an age (m), when it was `radiusM` at the younger age `thenS`.
+ * Radius of a zone at an age (m), when it was `radiusM` at the younger age `thenS`.
  *
  * It keeps its size for as long as a healthy data path takes, grows at walking speed,
  * and never shrinks.

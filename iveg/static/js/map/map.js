@@ -31,7 +31,7 @@ import { worldX, worldY } from "./viewport.js";
 
 export { LAYERS };
 
-/** Ages and rings grow without any message. */
+/** Ages and zones grow without any message. */
 const AGEING_MS = 250;
 const KEY_PAN_PX = 60;
 const DOUBLE_TAP_ZOOM = 2;

@@ -1,7 +1,7 @@
 /**
  * The scene on the map at one instant, from the store and a time.
  *
- * Layers only paint; whether a robot is a ghost, how far a ring has grown, whether a
+ * Layers only paint; whether a robot is a ghost, how far a zone has grown, whether a
  * sweep is too old to show is decided here, by pure functions of values and `nowMs`.
  *
  * @typedef {import("../core/store.js").Store} Store
@@ -25,7 +25,7 @@
  *
  * @typedef {{
  *   id: string, peer: boolean, unknown?: boolean, stage: "seen" | "remembered" | "last_seen",
- *   x: number, y: number, ageS: number, ringM: number, confidence: number,
+ *   x: number, y: number, ageS: number, zoneM: number, confidence: number,
  *   observers: string[], acting: Person["acting"], decisionId: string | null,
  *   isThing: boolean,
  * }} ScenePerson
@@ -204,7 +204,7 @@ export function readPerson(person, nowMs) {
     x: person.position.x,
     y: person.position.y,
     ageS,
-    ringM: ringNow(person, stage, ageS),
+    zoneM: ringNow(person, stage, ageS),
     confidence: person.confidence,
     observers: person.observers,
     acting: person.acting,
@@ -214,7 +214,7 @@ export function readPerson(person, nowMs) {
 
 /**
  * The people that the map shows: the mark of a lost person is removed after a minute, and
- * of marks that overlap each other, or a person with a ring, only the newest stays.
+ * of marks that overlap each other, or a person with a zone, only the newest stays.
  *
  * @param {ScenePerson[]} people
  */
@@ -233,7 +233,7 @@ export function marked(people) {
 }
 
 /**
- * The ring as the server drew it, grown on for as long as the server has been silent.
+ * The zone as the server drew it, grown on for as long as the server has been silent.
  *
  * @param {Person} person
  * @param {ScenePerson["stage"]} stage
@@ -249,7 +249,7 @@ function ringNow(person, stage, ageS) {
 /**
  * A person never gets fresher here than the server said, only older.
  *
- * Without a ring (the place was seen to be empty) no person is remembered there.
+ * Without a zone (the place was seen to be empty) no person is remembered there.
  *
  * @param {Person} person
  * @param {number} ageS

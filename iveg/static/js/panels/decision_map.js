@@ -46,7 +46,7 @@ export function sceneOf({ position, places, rule, ...told }, map) {
     stage: /** @type {const} */ ("seen"),
     ...position,
     ageS: 0,
-    ringM: rule.parameters?.ring_m ?? 2,
+    zoneM: rule.parameters?.ring_m ?? 2,
     confidence: told.confidence ?? 1,
     observers: told.observer ? [told.observer] : [],
     acting: [{ ...acting, in_sight: told.in_sight !== false }],
@@ -121,8 +121,8 @@ function paperTheme() {
 
 /** All that the picture is about (m). @param {NonNullable<ReturnType<typeof sceneOf>>} s */
 function boxOf({ people: [person], robots: placed }) {
-  const xs = [person.x - person.ringM, person.x + person.ringM];
-  const ys = [person.y - person.ringM, person.y + person.ringM];
+  const xs = [person.x - person.zoneM, person.x + person.zoneM];
+  const ys = [person.y - person.zoneM, person.y + person.zoneM];
   for (const { pose } of placed) {
     xs.push(pose.x - ROUND_M, pose.x + ROUND_M);
     ys.push(pose.y - ROUND_M, pose.y + ROUND_M);

@@ -177,7 +177,7 @@ const lastedSaid = ({ lastedS: seconds }, i18n) =>
   seconds === null ? "" : i18n.t("log.lasted", { seconds });
 
 /**
- * The text of an entry; for a slow-down far from any person, the reason: a grown ring.
+ * The text of an entry; for a slow-down far from any person, the reason: a grown zone.
  *
  * @param {Pick<Entry, "key" | "slots">} entry
  * @param {import("../core/i18n.js").I18n} i18n

@@ -1,6 +1,6 @@
 /**
  * The rows of the log: a change of speed that lasts less than a second is no row of its
- * own, so that a robot at the edge of a ring does not fill the log with 50 % and 100 %.
+ * own, so that a robot at the edge of a zone does not fill the log with 50 % and 100 %.
  *
  * A slow-down that is over within a second is one row that says how long it lasted; one
  * that comes back within a second, for the same reason, goes on as the row that it was.

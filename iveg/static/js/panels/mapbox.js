@@ -1,7 +1,7 @@
 /**
  * The map of the live page with its tools.
  *
- * Picking a person opens the decision behind its ring; picking a robot goes to its card;
+ * Picking a person opens the decision behind its zone; picking a robot goes to its card;
  * of a place that is known it says since when.
  */
 

@@ -102,17 +102,17 @@ export function distancesOf({ poses, sightings }) {
  * @param {Past} past @param {number} radiusM of somebody just seen
  * @returns {Sample[]}
  */
-export function ringsOf({ sightings, span }, radiusM) {
+export function zonesOf({ sightings, span }, radiusM) {
   const seen = sightings.map(({ at }) => Date.parse(at));
   const until = span.until;
   /** @type {Sample[]} */
-  const rings = [];
+  const radii = [];
   let next = 0;
   for (let at = seen[0]; at <= until; at += RING_EVERY_MS) {
     while (seen[next + 1] <= at) next += 1;
-    rings.push({ at, value: zoneRadius(radiusM, (at - seen[next]) / 1000) });
+    radii.push({ at, value: zoneRadius(radiusM, (at - seen[next]) / 1000) });
   }
-  return rings;
+  return radii;
 }
 
 /** @param {Pose[]} poses @param {number} moment */

@@ -59,7 +59,7 @@ export function createPeoplePanel({ store, i18n }) {
  * @returns {string[]}
  */
 export function linesOf(person, i18n) {
-  const { stage, ringM } = readPerson(person, performance.now());
+  const { stage, zoneM } = readPerson(person, performance.now());
   const { x, y } = person.position;
   const slots = {
     person: person.person_id,
@@ -67,7 +67,7 @@ export function linesOf(person, i18n) {
     observers: person.observers.join(", "),
     age: ageOf(person),
     confidence: person.confidence,
-    radius: ringM,
+    radius: zoneM,
     x,
     y,
   };

@@ -7,7 +7,7 @@
  */
 
 import { make } from "./dom.js";
-import { distancesOf, limitsOf, marginsOf, ringsOf, speedsOf } from "./past.js";
+import { distancesOf, limitsOf, marginsOf, speedsOf, zonesOf } from "./past.js";
 import { makePlot } from "./plot.js";
 
 /** Nobody is between two looks for longer. */
@@ -59,7 +59,7 @@ function makeDistance(past, radiusM, shade, i18n) {
       title: i18n.t("plot.distance"),
       says: i18n.t("plot.nearest", { least }),
       span: past.span,
-      lines: [away, lineOf("ring", ringsOf(past, radiusM), i18n)],
+      lines: [away, lineOf("ring", zonesOf(past, radiusM), i18n)],
       shade,
     },
     i18n,

@@ -2,7 +2,7 @@
  * People, over everything that moves in each frame: drawn when something of them has
  * changed and copied in between.
  *
- * Rings and figures of a crowd are hundreds of copies a frame; their image is one.  Of few
+ * Zones and figures of a crowd are hundreds of copies a frame; their image is one.  Of few
  * people the copies are fewer pixels than the rectangle around them, so they are drawn
  * themselves.
  *
@@ -14,7 +14,7 @@ import { screenX, screenY } from "../viewport.js";
 import { matchPixels } from "./paint.js";
 import { isSame, placeOf } from "./static.js";
 
-/** Ages have tenths of a second, and a ring grows by a pixel in about that time. */
+/** Ages have tenths of a second, and a zone grows by a pixel in about that time. */
 const AGEING_MS = 100;
 /** How far a figure and the age below or above it reach at least (px). */
 const ASIDE_PX = 80;
@@ -72,9 +72,9 @@ export function createAbove(draw) {
  */
 function boxOf({ scene, view }) {
   let [left, top, right, bottom] = [view.width, view.height, 0, 0];
-  for (const { x, y, ringM } of scene.people) {
-    const [px, py, ring] = [screenX(view, x), screenY(view, y), ringM * view.scale + 2];
-    const [aside, up] = [Math.max(ring, ASIDE_PX), Math.max(ring, UP_PX)];
+  for (const { x, y, zoneM } of scene.people) {
+    const [px, py, edge] = [screenX(view, x), screenY(view, y), zoneM * view.scale + 2];
+    const [aside, up] = [Math.max(edge, ASIDE_PX), Math.max(edge, UP_PX)];
     left = Math.min(left, px - aside);
     right = Math.max(right, px + aside);
     top = Math.min(top, py - up);
@@ -91,8 +91,8 @@ function boxOf({ scene, view }) {
 /** Whether drawing them costs less than to copy all. @param {Paint} paint @param {Rect} box */
 function isFew({ scene, view }, { left, top, right, bottom }) {
   let pixels = 0;
-  for (const { ringM } of scene.people) {
-    pixels += (2 * ringM * view.scale) ** 2 + COPY_PX;
+  for (const { zoneM } of scene.people) {
+    pixels += (2 * zoneM * view.scale) ** 2 + COPY_PX;
   }
   return right <= left || bottom <= top || pixels <= (right - left) * (bottom - top);
 }
@@ -102,11 +102,11 @@ function contentOf({ scene, view }) {
   /** @type {unknown[]} */
   const content = [scene.people.length];
   let ages = 0;
-  for (const { stage, peer, unknown, isThing, x, y, ringM } of scene.people) {
+  for (const { stage, peer, unknown, isThing, x, y, zoneM } of scene.people) {
     const isSeen = stage === "seen";
     if (!isSeen) ages = Math.floor(scene.nowMs / AGEING_MS);
     content.push(stage, peer, unknown, isThing, x, y);
-    if (isSeen) content.push(Math.round(ringM * view.scale));
+    if (isSeen) content.push(Math.round(zoneM * view.scale));
   }
   content.push(ages);
   return content;

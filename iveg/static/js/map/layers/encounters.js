@@ -52,7 +52,7 @@ function drawMark(paint, { cause, place, centre, radius_m }) {
   circle(ctx, x, y, MARK_PX);
   ctx.stroke();
   const person = scene.people.find(({ id }) => id === cause);
-  const border = person && borderTowards(place, person, person.ringM);
+  const border = person && borderTowards(place, person, person.zoneM);
   if (!border) return;
   ctx.lineWidth = 1;
   ctx.setLineDash([3, 3]);

@@ -1,10 +1,10 @@
 /**
- * People, and peers seen by robots, with the ring that the rule keeps around them.
+ * People, and peers seen by robots, with the zone that the rule keeps around them.
  *
  * *Seen* is solid; *remembered* is dashed and grows at walking speed; *last seen* is a
  * marker alone, which fades and is removed after a minute: the person's place is unknown by
  * then, and the marks of a morning would hide people who are there.  What is marked as no
- * person has no ring, and a line through it.
+ * person has no zone, and a line through it.
  */
 
 import { MARK_LIMIT_S } from "../scene.js";
@@ -18,11 +18,11 @@ import { drawSign } from "./sprites.js";
  * @typedef {import("../scene.js").ScenePerson} ScenePerson
  */
 
-/** From this scale on (px/m) there is room for words, and a ring grows by a pixel a frame. */
+/** From this scale on (px/m) there is room for words, and a zone grows by a pixel a frame. */
 const NEAR_SCALE = 24;
-/** Of a figure, with its outline; and the width of a ring's line. */
+/** Of a figure, with its outline; and the width of a zone's line. */
 const FIGURE_PX = 12;
-const RING_PX = 2;
+const ZONE_PX = 2;
 
 /** The letters of an age. */
 const AGE = { size: 11 };
@@ -65,14 +65,14 @@ export function labelled({ scene, view }) {
 function drawPerson(paint, person) {
   const { ctx, view } = paint;
   const place = { x: screenX(view, person.x), y: screenY(view, person.y) };
-  const ring = Math.round(person.ringM * view.scale);
+  const edge = Math.round(person.zoneM * view.scale);
   const isSeen = person.stage === "seen";
-  // From near, a ring that grows is in each frame like no other.
+  // From near, a zone that grows is in each frame like no other.
   const kept = isSeen || view.scale < NEAR_SCALE ? paint.sprites : undefined;
   if (person.stage !== "last_seen" && !person.isThing) {
-    const name = `ring ${ring} ${isSeen}`;
-    const sign = { name, reach: ring + RING_PX, ...place };
-    drawSign(paint, kept, sign, (there) => drawRing(there, person));
+    const name = `zone ${edge} ${isSeen}`;
+    const sign = { name, reach: edge + ZONE_PX, ...place };
+    drawSign(paint, kept, sign, (there) => drawZone(there, person));
   }
   ctx.globalAlpha = strengthOf(person);
   const kind = person.unknown ? "unknown" : person.peer ? "peer" : "person";
@@ -121,15 +121,15 @@ function placeOfAge(paint, text, x, y) {
 }
 
 /** @param {Paint} paint @param {ScenePerson} person */
-function drawRing({ ctx, view, theme }, person) {
+function drawZone({ ctx, view, theme }, person) {
   const isSeen = person.stage === "seen";
-  circle(ctx, 0, 0, person.ringM * view.scale);
+  circle(ctx, 0, 0, person.zoneM * view.scale);
   ctx.fillStyle = theme.ring;
   ctx.globalAlpha = isSeen ? 0.1 : 0.05;
   ctx.fill();
   ctx.globalAlpha = 1;
   ctx.strokeStyle = theme.ring;
-  ctx.lineWidth = RING_PX;
+  ctx.lineWidth = ZONE_PX;
   ctx.setLineDash(isSeen ? [] : [8, 6]);
   ctx.stroke();
   ctx.setLineDash([]);

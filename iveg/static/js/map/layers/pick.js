@@ -1,5 +1,5 @@
 /**
- * The object under a finger: a robot before a person, a person before its ring.
+ * The object under a finger: a robot before a person, a person before its zone.
  *
  * @typedef {import("../scene.js").Scene} Scene
  * @typedef {import("../viewport.js").Viewport} Viewport
@@ -34,13 +34,13 @@ export function pick(scene, view, px, py, isOn) {
   if (person && isOn("people")) return { kind: "person", id: person.id };
   const seen = nearest(detections, gapTo, () => FINGER_PX);
   if (seen && isOn("detections")) return { kind: "detection", id: seen.id };
-  const ring = nearest(people, gapTo, (it) => ringOf(it) * view.scale);
-  return ring && isOn("people") ? { kind: "person", id: ring.id } : null;
+  const zone = nearest(people, gapTo, (it) => zoneOf(it) * view.scale);
+  return zone && isOn("people") ? { kind: "person", id: zone.id } : null;
 }
 
 /** @param {Scene["people"][number]} person */
-function ringOf(person) {
-  return person.stage === "last_seen" ? 0 : person.ringM;
+function zoneOf(person) {
+  return person.stage === "last_seen" ? 0 : person.zoneM;
 }
 
 /**
