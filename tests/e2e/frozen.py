@@ -113,23 +113,18 @@ def frozen_page(
     """A signed-in page that will hear what ``tell`` says in place of ``/live``.
 
     Args:
-        theme: Of the page, or ``forced``: colours of the system, light on black.
         lines: Takes the page's lines, for whoever wants to tell more.
     """
-    is_forced = theme == "forced"
     context = browser.new_context(
         viewport={"width": size[0], "height": size[1]},
         locale="es-ES",
         reduced_motion="reduce",
-        forced_colors="active" if is_forced else "none",
-        color_scheme="dark" if is_forced else "light",
     )
     context.set_default_timeout(PATIENCE_MS)
     context.add_init_script("localStorage.setItem('iveg.hints', '3')")
     page = context.new_page()
     page.goto(f"{past.sign_in_link}", wait_until="commit")
-    shown = "auto" if is_forced else theme
-    looks = {"iveg_theme": shown, "iveg_language": language}
+    looks = {"iveg_theme": theme, "iveg_language": language}
     context.add_cookies(
         [{"name": name, "value": look, "url": past.url} for name, look in looks.items()]
     )
