@@ -1,4 +1,4 @@
-"""Issue 13.23: installable, and one honest sentence without a connection."""
+"""The page without a connection: one honest sentence."""
 
 import re
 from collections.abc import Iterator
