@@ -3,12 +3,10 @@
 import argparse
 import asyncio
 import contextlib
-import os
 import sys
-from collections.abc import Callable, Coroutine
-from datetime import UTC, datetime
-from functools import partial
-from typing import Any, BinaryIO
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
 
 from iveg.adapters.database_check import check_database
 from iveg.adapters.history.engine import history_url
@@ -17,11 +15,7 @@ from iveg.adapters.history.queries import Queries
 from iveg.cli.arguments import CommandCall
 from iveg.domain.errors import HopError, SettingsError
 from iveg.domain.stamps import parse_stamp
-from iveg.web.api import exports
-from iveg.web.api.history import HistoryList, lists_of
-from iveg.web.api.history_filters import NO_DAY, is_kept
-
-_MOMENT = "a moment as ISO-8601, in UTC unless it says otherwise"
+from iveg.web.api.history import file_parts, lists_of
 
 
 def run(call: CommandCall) -> int:
@@ -36,10 +30,14 @@ def run(call: CommandCall) -> int:
     until = _moment("--until", options.until)
     if since is not None and until is not None and since > until:
         raise SettingsError("--since", options.since, "a moment before --until")
-    asked = Filter(since=since, until=until, robot=options.robot, limit=MOST_ROWS)
+    wanted = Filter(since=since, until=until, robot=options.robot, limit=MOST_ROWS)
     check_database(url)
-    with contextlib.closing(Queries(url)) as queries:
-        _write(options, queries, asked)
+    try:
+        with contextlib.closing(Queries(url)) as queries, _opened(options.out) as file:
+            asyncio.run(_export(options, queries, wanted, file))
+    except OSError as error:
+        hop = "output" if options.out is None else "disk"
+        raise HopError(hop, error.strerror or str(error)) from error
     return 0
 
 
@@ -48,58 +46,36 @@ def _moment(option: str, text: str | None) -> float | None:
         return None
     found = parse_stamp(text)
     if found is None:
-        raise SettingsError(option, text, _MOMENT)
-    if not _is_of_history(found):
-        raise SettingsError(option, text, f"{_MOMENT}; that is {NO_DAY}")
+        wanted = "a moment as ISO-8601, in UTC unless it says otherwise"
+        raise SettingsError(option, text, wanted)
     return found
 
 
-def _is_of_history(moment: float) -> bool:
-    try:
-        return is_kept(datetime.fromtimestamp(moment, UTC).date())
-    except (OverflowError, ValueError):
-        return False
-
-
-def _write(options: argparse.Namespace, queries: Queries, asked: Filter) -> None:
-    (one,) = (one for one in lists_of(queries) if one.path == options.list)
-    work = partial(_export, queries, one, asked, options.format)
-    if options.out is None:
-        _print(work)
+@contextlib.contextmanager
+def _opened(out: Path | None) -> Iterator[BinaryIO]:
+    """The output, or a file that takes its place once it is whole."""
+    if out is None:
+        # A buffer of its own: what a closed pipe left in it fails here, not at exit.
+        with open(sys.stdout.fileno(), "wb", closefd=False) as file:
+            yield file
         return
-    if options.out.exists() and not options.out.is_file():
+    if out.exists() and not out.is_file():
         # Whatever writes to it would find a file in its place.
-        raise HopError("disk", f"{options.out} is there and no file")
-    part = options.out.with_name(options.out.name + ".part")
+        raise HopError("disk", f"{out} is there and no file")
+    part = out.with_name(out.name + ".part")
     try:
         with part.open("wb") as file:
-            asyncio.run(work(file))
-        part.replace(options.out)
-    except OSError as error:
-        raise HopError("disk", error.strerror or str(error)) from error
+            yield file
+        part.replace(out)
     finally:
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
-
-
-def _print(work: Callable[[BinaryIO], Coroutine[Any, Any, None]]) -> None:
-    try:
-        asyncio.run(work(sys.stdout.buffer))
-        sys.stdout.buffer.flush()
-    except OSError as error:
-        # What is left in the buffer would fail once more when the program ends.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        raise HopError("output", error.strerror or str(error)) from error
+        part.unlink(missing_ok=True)
 
 
 async def _export(
-    queries: Queries, one: HistoryList[Any], asked: Filter, form: str, file: BinaryIO
+    options: argparse.Namespace, queries: Queries, wanted: Filter, file: BinaryIO
 ) -> None:
-    first = await queries.page(one.of, asked)
-    if form == "csv":
-        file.write(exports.csv_head(one.of.kind))
-    async for records in queries.pages(one.of, first, asked):
-        if form == "csv":
-            file.write(exports.csv_rows(one.of.kind, records))
-        else:
-            file.write(exports.ndjson_rows(one.model, await one.rows(records)))
+    (one,) = (one for one in lists_of(queries) if one.path == options.list)
+    first = await queries.page(one.source, wanted)
+    pages = queries.pages(one.source, first, wanted)
+    async for part in file_parts(one, pages, options.format, asyncio.to_thread):
+        file.write(part)

@@ -12,13 +12,12 @@ matches the copies of each message, a ``Series`` keeps the durations of one hop,
 ``PAPER`` has the numbers to stand beside them.
 """
 
-from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from itertools import accumulate
+from math import ceil, log
 from typing import Final, Literal, get_args
-
-import numpy as np
-from numpy.typing import NDArray
 
 from iveg.domain.clock_offset import LONGEST_S, ClockOffset
 from iveg.domain.observations import (
@@ -64,100 +63,83 @@ _SHORTEST_S, _LONGEST_S = 1e-6, 600.0
 """Shorter and longer ones count as these, which bounds the bins to 1,012."""
 _GAMMA: Final = 1.01 / 0.99
 """Ratio of neighbouring bins: a quantile is off by 1 % of itself at most."""
-_LOG_GAMMA: Final = float(np.log(_GAMMA))
+_LOG_GAMMA: Final = log(_GAMMA)
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class Sketch:
-    """Durations of one hop, counted by logarithmic bins; never changes.
+    """Durations of one hop, counted by logarithmic bins.
 
-    The bins are DDSketch's (Masson, Rim, Lee: VLDB 2019).  Sketches may be merged in
-    another thread while the next one fills.
+    The bins are DDSketch's (Masson, Rim, Lee: VLDB 2019).
 
     Attributes:
-        count: Number of durations.
-        total: Their sum (s); ``least`` and ``most`` (s), all exact.
-        keys: Shape (n,): bins that are not empty, rising.
-        counts: Shape (n,): number of durations in each.
+        bins: Bin → number of durations in it.
+        total: Sum of the durations (s).
     """
 
-    count: int = 0
+    bins: Counter[int] = field(default_factory=Counter)
     total: float = 0.0
-    least: float = float("inf")
-    most: float = 0.0
-    keys: NDArray[np.int16] = field(default_factory=lambda: np.empty(0, np.int16))
-    counts: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+
+    def add(self, duration_s: float) -> None:
+        """Count one more, not below zero."""
+        inside = min(max(duration_s, _SHORTEST_S), _LONGEST_S)
+        self.bins[ceil(log(inside) / _LOG_GAMMA)] += 1
+        self.total += duration_s
+
+    def include(self, other: "Sketch") -> None:
+        """Count those of another, too."""
+        self.bins.update(other.bins)
+        self.total += other.total
+
+    @property
+    def count(self) -> int:
+        """Number of durations."""
+        return self.bins.total()
 
     @property
     def mean(self) -> float | None:
         """(s); None of nothing."""
-        return self.total / self.count if self.count else None
+        return self.total / self.count if self.bins else None
 
     def quantile(self, share: float) -> float | None:
         """The quantile of a share (0 to 1) (s), within 1 %; None without data."""
-        if not self.count:
-            return None
         rank = share * (self.count - 1)
-        place = np.searchsorted(np.cumsum(self.counts), rank, side="right")
-        value: float = 2.0 * _GAMMA ** float(self.keys[place]) / (1.0 + _GAMMA)
-        return min(max(value, self.least), self.most)
+        seen = 0
+        for number, count in sorted(self.bins.items()):
+            seen += count
+            if seen > rank:
+                return 2.0 * _GAMMA**number / (1.0 + _GAMMA)
+        return None
 
     def distribution(self) -> tuple[list[float], list[float]]:
         """Rising durations (s), and the share (0 to 1) that did not exceed each."""
-        edges = np.minimum(np.exp(self.keys * _LOG_GAMMA), self.most)
-        shares = np.cumsum(self.counts) / max(1, self.count)
-        return edges.tolist(), shares.tolist()
-
-
-NOTHING: Final = Sketch()
-
-
-def sketch_of(durations: Sequence[float]) -> Sketch:
-    """Durations (s, not below zero) as a sketch."""
-    if not durations:
-        return NOTHING
-    values = np.asarray(durations, np.float64)
-    inside = np.clip(values, _SHORTEST_S, _LONGEST_S)
-    bins = np.ceil(np.log(inside) / _LOG_GAMMA).astype(np.int16)
-    keys, counts = np.unique(bins, return_counts=True)
-    least, most = float(values.min()), float(values.max())
-    return Sketch(values.size, float(values.sum()), least, most, keys, counts)
+        numbers = sorted(self.bins)
+        counts = accumulate(self.bins[number] for number in numbers)
+        whole = self.count
+        return [_GAMMA**one for one in numbers], [count / whole for count in counts]
 
 
 def merged(sketches: Iterable[Sketch]) -> Sketch:
     """All of them as one: as if their durations had gone into it."""
-    parts = [sketch for sketch in sketches if sketch.count]
-    if len(parts) < 2:
-        return parts[0] if parts else NOTHING
-    keys, places = np.unique(
-        np.concatenate([part.keys for part in parts]), return_inverse=True
-    )
-    weights = np.concatenate([part.counts for part in parts])
-    return Sketch(
-        sum(part.count for part in parts),
-        sum(part.total for part in parts),
-        min(part.least for part in parts),
-        max(part.most for part in parts),
-        keys,
-        np.bincount(places, weights).astype(np.int64),
-    )
+    whole = Sketch()
+    for sketch in sketches:
+        whole.include(sketch)
+    return whole
 
 
 SLICE_S: Final = 10.0
-SLICES_A_MINUTE: Final = 6
-_MINUTES_AN_HOUR: Final = 60
-_BUFFER: Final = 512
+_WINDOWS: Final[dict[Window, tuple[int, int]]] = {
+    "1min": (1, 6),
+    "15min": (6, 15),
+    "24h": (360, 24),
+}
+"""Slices in one sketch of a window, and number of its whole sketches."""
 
 
 class Series:
     """Durations of one hop, for one kind of data of one robot.
 
-    ::
-
-        added ──> buffer ──10 s──> slice ──60 s──> minute ──60 min──> hour
-                  at most 512      6 kept          60 kept            24 kept
-
-    A window of a day is read from at most 24 hours, 59 minutes and 5 slices.
+    Ten seconds fill one sketch; then they join the newest of each window's ring.
 
     Attributes:
         count: Number of durations since the start; ``total`` their sum (s).
@@ -165,53 +147,33 @@ class Series:
 
     def __init__(self) -> None:
         self.count, self.total = 0, 0.0
-        self._buffer: list[float] = []
-        self._folded: list[Sketch] = []
-        self._slices: deque[Sketch] = deque(maxlen=SLICES_A_MINUTE)
-        self._minutes: deque[Sketch] = deque(maxlen=_MINUTES_AN_HOUR)
-        self._hours: deque[Sketch] = deque(maxlen=24)
         self._ended = 0
+        self._filling = Sketch()
+        self._rings = {
+            window: deque([Sketch()], maxlen=kept + 1)
+            for window, (_, kept) in _WINDOWS.items()
+        }
 
     def add(self, duration_s: float) -> None:
         """One more message passed."""
         self.count += 1
         self.total += duration_s
-        self._buffer.append(duration_s)
-        if len(self._buffer) >= _BUFFER:
-            self._fold()
+        self._filling.add(duration_s)
 
     def end_slice(self) -> None:
         """Ten seconds are over."""
-        self._fold()
-        self._slices.append(merged(self._folded))
-        self._folded = []
         self._ended += 1
-        minutes, slices = divmod(self._ended, SLICES_A_MINUTE)
-        if slices == 0:
-            self._minutes.append(merged(self._slices))
-            if minutes % _MINUTES_AN_HOUR == 0:
-                self._hours.append(merged(self._minutes))
+        for window, (slices, _) in _WINDOWS.items():
+            ring = self._rings[window]
+            ring[-1].include(self._filling)
+            if self._ended % slices == 0:
+                ring.append(Sketch())
+        self._filling = Sketch()
 
     def parts(self, window: Window) -> list[Sketch]:
-        """Finished sketches that together are this window, to be merged."""
-        self._fold()
-        minutes, slices = divmod(self._ended, SLICES_A_MINUTE)
-        if window == "1min":
-            return [*self._slices, *self._folded]
-        newest = [*_last(self._slices, slices), *self._folded]
-        if window == "15min":
-            return [*_last(self._minutes, 15), *newest]
-        since_the_hour = _last(self._minutes, minutes % _MINUTES_AN_HOUR)
-        return [*self._hours, *since_the_hour, *newest]
-
-    def _fold(self) -> None:
-        if self._buffer:
-            self._folded.append(sketch_of(self._buffer))
-            self._buffer = []
-
-
-def _last(kept: Sequence[Sketch], count: int) -> list[Sketch]:
-    return list(kept)[max(0, len(kept) - count) :]
+        """Sketches that together are this window; none of them changes any more."""
+        *whole, newest = self._rings[window]
+        return [*whole, merged([newest, self._filling])]
 
 
 # --- messages at their hops -----------------------------------------------------------

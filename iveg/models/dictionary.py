@@ -6,11 +6,9 @@ prints docs/interfaces/columns.md.
 """
 
 import sys
-from dataclasses import asdict
 from typing import Final
 
-from iveg.domain.records import LISTS, SHOWN_COLUMNS, ColumnType
-from iveg.models.base import Model
+from iveg.domain.records import LISTS, SHOWN_COLUMNS
 
 _HEAD: Final = """\
 # Columns of exports
@@ -23,41 +21,6 @@ _TABLE: Final = """
 | column | type | unit | frame | clock | meaning | joins |
 |---|---|---|---|---|---|---|
 """
-
-
-class DictionaryColumn(Model):
-    """One column of an exported list; empty where nothing is to be said.
-
-    Attributes:
-        list: List, as in its address.
-        column: Name.
-        type: Of its values.
-        unit: Unit or range.
-        frame: Frame of coordinates.
-        clock: Whose clock a time is by.
-        means: Meaning.
-        joins: How its rows find those of other lists.
-    """
-
-    list: str
-    column: str
-    type: ColumnType
-    unit: str
-    frame: str
-    clock: str
-    means: str
-    joins: str
-
-
-def dictionary_columns() -> list[DictionaryColumn]:
-    """All columns of all lists."""
-    return [
-        DictionaryColumn(
-            list=name, column=one.name, type=one.type, **asdict(one.meaning)
-        )
-        for name, kind in LISTS.items()
-        for one in SHOWN_COLUMNS[kind]
-    ]
 
 
 def describe() -> str:

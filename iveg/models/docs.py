@@ -16,7 +16,6 @@ from pydantic.json_schema import models_json_schema
 from iveg.domain.records import Json
 from iveg.models.access import SessionsEnded
 from iveg.models.base import Model
-from iveg.models.dictionary import DictionaryColumn
 from iveg.models.health import Recording
 from iveg.models.history import (
     AcknowledgedAlerts,
@@ -39,7 +38,6 @@ SHOWN: Final[tuple[type[Model], ...]] = (
     OdometryRow,
     Measurement,
     Recording,
-    DictionaryColumn,
     Note,
     SessionsEnded,
 )

@@ -1,4 +1,4 @@
-"""Lists of records in pages that stay in step while rows are added.
+"""Lists of records, newest first, in pages that stay in step while rows are added.
 
 A page ends in a cursor that names its last row, not a count of rows, so that neither
 new rows nor deep pages make the next one wrong or slow.
@@ -6,10 +6,8 @@ new rows nor deep pages make the next one wrong or slow.
 
 import base64
 import binascii
-import string
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from hashlib import blake2s
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 import orjson
@@ -19,8 +17,6 @@ from sqlalchemy import (
     Connection,
     RowMapping,
     Table,
-    and_,
-    func,
     literal,
     or_,
     select,
@@ -54,13 +50,11 @@ class ListOf(Generic[R]):
     Attributes:
         classes: Columns that the class filter looks at.
         which: Rows that are in the list at all; None: every one of the table.
-        sorts: Columns that it can be sorted by beside its time, by name.
     """
 
     kind: type[R]
     classes: tuple[str, ...] = ()
     which: ColumnElement[bool] | None = None
-    sorts: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def table(self) -> Table:
@@ -79,13 +73,13 @@ class ListOf(Generic[R]):
 
 
 _SEEN = "class_", "class_id"
-DECISIONS = ListOf(DecisionRecord, _SEEN, sorts={"robot": "robot_id"})
+DECISIONS = ListOf(DecisionRecord, _SEEN)
 DETECTIONS = ListOf(DetectionRecord, _SEEN)
 TRACKS = replace(DETECTIONS, which=tables.detections.c.person_id.is_not(None))
 ODOMETRY = ListOf(OdometryRecord)
-COMMANDS = ListOf(CommandRecord, sorts={"robot": "robot_id", "kind": "kind"})
-ALERTS = ListOf(AlertRecord, sorts={"robot": "robot_id", "priority": "priority"})
-LOG = ListOf(LogRecord, ("class_",), sorts={"robot": "robot_id", "kind": "kind"})
+COMMANDS = ListOf(CommandRecord)
+ALERTS = ListOf(AlertRecord)
+LOG = ListOf(LogRecord, ("class_",))
 NOTE = "log.note"
 NOTES = replace(LOG, which=tables.log.c.key == NOTE)
 READINGS = ListOf(ReadingRecord, ("kind",))
@@ -95,59 +89,49 @@ AUDIT = ListOf(AuditRecord, ("action", "name"))
 
 @dataclass(frozen=True, slots=True)
 class Cursor:
-    """The last row of a page: its time and what tells it from others of that time.
-
-    Attributes:
-        question: What was asked for (``lists.question_of``): only that goes on here.
-        group: Its value in the column that the list is sorted by; None: by time.
-    """
+    """Last row of a page: its time, and what tells it from others of that time."""
 
     at: float
     key: int | str
-    question: str = ""
-    group: str | None = None
 
 
 def write_cursor(cursor: Cursor) -> str:
     """A cursor as opaque text that fits into a URL."""
-    group = () if cursor.group is None else (cursor.group,)
-    parts = [cursor.at, cursor.key, cursor.question, *group]
-    text = base64.urlsafe_b64encode(orjson.dumps(parts))
+    text = base64.urlsafe_b64encode(orjson.dumps([cursor.at, cursor.key]))
     return text.decode().rstrip("=")
 
 
-def read_cursor(text: str, of: ListOf[R]) -> Cursor:
-    """A cursor that ``write_cursor`` wrote for the same list.
+def read_cursor(text: str, listed: ListOf[R]) -> Cursor:
+    """A cursor that ``write_cursor`` wrote for a list with such keys.
 
     Raises:
         UnreadableError: it did not.
     """
     try:
         padded = text.encode("ascii") + b"=" * (-len(text) % 4)
-        at, key, question, *group = orjson.loads(base64.urlsafe_b64decode(padded))
+        at, key = orjson.loads(base64.urlsafe_b64decode(padded))
     except (ValueError, TypeError, binascii.Error) as error:
         raise UnreadableError("bad_cursor") from error
-    is_group = [*map(type, group)] in ([], [str]) and "".join(group).isprintable()
-    is_named = isinstance(question, str) and is_group
-    if not (isinstance(at, float) and _is_key(key, of) and is_named):
+    if not (isinstance(at, float) and _is_key(key, listed)):
         raise UnreadableError("bad_cursor")
-    return Cursor(at, key, question, *group)
+    return Cursor(at, key)
 
 
-def _is_key(key: object, of: ListOf[R]) -> bool:
+def _is_key(key: object, listed: ListOf[R]) -> bool:
     # Only what a column can hold: the rest would fail inside the database.
-    if of.key.type.python_type is int:
+    if listed.key.type.python_type is int:
         return type(key) is int and 0 <= key < 2**63
     return isinstance(key, str) and key.isascii() and key.isprintable()
 
 
 USUAL_ROWS, MOST_ROWS = 100, 1000
-BY_TIME, NEWEST_FIRST = "at", "-at"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Filter:
-    """Which rows of a list; None does not ask.  A row without the field is not asked.
+    """Conditions on the rows of a list; None: any.
+
+    One on a field that the rows lack holds for each of them.
 
     Attributes:
         since: Inclusive; ``until`` exclusive (Unix seconds).
@@ -155,8 +139,6 @@ class Filter:
         person: Id of a person.
         min_probability: Inclusive, 0 to 1.
         limit: Rows of a page.
-        sort: ``at``, or one of the list's ``sorts``, a ``-`` before it for downwards;
-            rows of one value are newest first.
     """
 
     since: float | None = None
@@ -167,111 +149,56 @@ class Filter:
     min_probability: float | None = None
     limit: int = USUAL_ROWS
     cursor: Cursor | None = None
-    sort: str = NEWEST_FIRST
 
 
 @dataclass(frozen=True, slots=True)
 class Page(Generic[R]):
-    """Some rows in their order, and where the next page starts; None at the end."""
+    """Some rows, newest first, and where the next page starts; None at the end."""
 
     items: tuple[R, ...]
     next: Cursor | None
 
 
-def read_page(connection: Connection, of: ListOf[R], asked: Filter) -> Page[R]:
+def read_page(connection: Connection, listed: ListOf[R], wanted: Filter) -> Page[R]:
     """One page of a list."""
-    limit = min(max(asked.limit, 1), MOST_ROWS)
-    group = _group(of, asked.sort)
+    limit = min(max(wanted.limit, 1), MOST_ROWS)
     statement = (
-        select(of.table)
-        .where(*conditions(of, asked), *_after(of, group, asked))
-        .order_by(*_order(of, group, asked.sort))
+        select(listed.table)
+        .where(*conditions(listed, wanted))
+        .order_by(listed.at.desc(), listed.key.desc())
         .limit(limit + 1)
     )
     rows = connection.execute(statement).mappings().all()
-    items = tuple(record_of(of.kind, row) for row in rows[:limit])
+    items = tuple(record_of(listed.kind, row) for row in rows[:limit])
     if len(rows) <= limit:
         return Page(items, None)
     last = rows[limit - 1]
-    value = None if not group else last[of.table.c[of.sorts[_name(asked.sort)]]] or ""
-    asked_for = question_of(of, asked)
-    return Page(items, Cursor(last[of.at], last[of.key], asked_for, value))
+    return Page(items, Cursor(last[listed.at], last[listed.key]))
 
 
-def question_of(of: ListOf[Any], asked: Filter) -> str:
-    """Digest of a question: its list, filters and order."""
-    rows = of.table.name, str(of.which), replace(asked, limit=0, cursor=None)
-    return blake2s(repr(rows).encode(), digest_size=6).hexdigest()
-
-
-def _name(sort: str) -> str:
-    return sort.removeprefix("-")
-
-
-def _group(of: ListOf[R], sort: str) -> tuple[ColumnElement[Any], ...]:
-    """Columns that sort a list before its time; empty: by that alone."""
-    if _name(sort) == BY_TIME:
-        return ()
-    return _as_counted(func.coalesce(of.table.c[of.sorts[_name(sort)]], ""))
-
-
-def _as_counted(name: ColumnElement[str]) -> tuple[ColumnElement[Any], ...]:
-    """Sort keys of names that may end in a number, as people count: R2 before R10.
-
-    Of the names that differ by that number alone, the shorter has the smaller.
-    """
-    return func.rtrim(name, string.digits), func.length(name), name
-
-
-def _order(
-    of: ListOf[R], group: tuple[ColumnElement[Any], ...], sort: str
-) -> Iterator[ColumnElement[Any]]:
-    falls = sort.startswith("-")
-    for column in group:
-        yield column.desc() if falls else column.asc()
-    falls = falls or bool(group)
-    for column in (of.at, of.key):
-        yield column.desc() if falls else column.asc()
-
-
-def _after(
-    of: ListOf[R], group: tuple[ColumnElement[Any], ...], asked: Filter
-) -> Iterator[ColumnElement[bool]]:
-    """Condition of the rows after the cursor."""
-    if (cursor := asked.cursor) is None:
-        return
-    falls = asked.sort.startswith("-")
-    place = tuple_(of.at, of.key)
-    last = tuple_(literal(cursor.at), literal(cursor.key))
-    if not group:
-        yield place < last if falls else place > last
-    else:
-        here = tuple_(*group)
-        there = tuple_(*_as_counted(literal(cursor.group)))
-        beyond = here < there if falls else here > there
-        yield or_(beyond, and_(here == there, place < last))
-
-
-def conditions(of: ListOf[R], asked: Filter) -> Iterator[ColumnElement[bool]]:
-    """SQL conditions of a filter."""
-    if of.which is not None:
-        yield of.which
-    if asked.since is not None:
-        yield of.at >= asked.since
-    if asked.until is not None:
-        yield of.at < asked.until
-    columns = of.table.c
+def conditions(listed: ListOf[R], wanted: Filter) -> Iterator[ColumnElement[bool]]:
+    """SQL conditions of a filter and its cursor."""
+    if listed.which is not None:
+        yield listed.which
+    if wanted.since is not None:
+        yield listed.at >= wanted.since
+    if wanted.until is not None:
+        yield listed.at < wanted.until
+    columns = listed.table.c
     robot = columns.get("robot_id", columns.get("subject"))
-    if asked.robot is not None and robot is not None:
-        yield robot == asked.robot
+    if wanted.robot is not None and robot is not None:
+        yield robot == wanted.robot
     person = columns.get("person_id", columns.get("person"))
-    if asked.person is not None and person is not None:
-        yield person == asked.person
-    if asked.class_ is not None and of.classes:
-        yield or_(*(columns[name] == asked.class_ for name in of.classes))
+    if wanted.person is not None and person is not None:
+        yield person == wanted.person
+    if wanted.class_ is not None and listed.classes:
+        yield or_(*(columns[name] == wanted.class_ for name in listed.classes))
     probability = columns.get("probability", columns.get("confidence"))
-    if asked.min_probability is not None and probability is not None:
-        yield probability >= asked.min_probability
+    if wanted.min_probability is not None and probability is not None:
+        yield probability >= wanted.min_probability
+    if wanted.cursor is not None:
+        last = tuple_(literal(wanted.cursor.at), literal(wanted.cursor.key))
+        yield tuple_(listed.at, listed.key) < last
 
 
 def record_of(kind: type[R], row: RowMapping) -> R:

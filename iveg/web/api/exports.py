@@ -36,34 +36,32 @@ MEDIA_TYPES: dict[Form, str] = {
 }
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 R = TypeVar("R", bound=Record)
-_Told = LogRecord | AlertRecord | DecisionRecord
+_Spoken = LogRecord | AlertRecord | DecisionRecord
 """Rows with a sentence; the others are numbers alone."""
 
 
 def form_of(headers: Headers) -> Form:
-    """The form that the ``Accept`` header prefers; JSON without one."""
-    best: Form = "json"
-    weight = 0.0
-    for part in headers.get("accept", "").split(","):
-        kind, _, rest = part.partition(";")
-        liked = _quality(rest)
-        for form, media_type in MEDIA_TYPES.items():
-            if kind.strip().lower() == media_type and liked > weight:
-                best, weight = form, liked
-    return best
+    """The form that the ``Accept`` header names first; JSON without one."""
+    accepted = headers.get("accept", "").lower()
+    named = [
+        (accepted.index(media_type), form)
+        for form, media_type in MEDIA_TYPES.items()
+        if media_type in accepted
+    ]
+    return min(named)[1] if named else "json"
 
 
 def csv_head(kind: type[R], reader: Sentences | None = None) -> bytes:
     """The first line of rows as CSV (RFC 4180), one column a field of the record.
 
     Args:
-        kind: What each row is.
-        reader: Whose spreadsheet it is for; None for programs.
+        kind: Of the rows.
+        reader: Its spreadsheet has words and decimals of its language; None: programs.
     """
     head = [one.name for one in SHOWN_COLUMNS[kind]]
     if reader is None:
         return csv_lines([head])
-    if issubclass(kind, _Told):
+    if issubclass(kind, _Spoken):
         head = [reader.say("export.sentence", {}), *head]
     return codecs.BOM_UTF8 + csv_lines([head], reader)
 
@@ -75,7 +73,7 @@ def csv_rows(
     rows = []
     for record in records:
         row = [_cell_of(one, record, reader) for one in SHOWN_COLUMNS[kind]]
-        if reader is not None and isinstance(record, _Told):
+        if reader is not None and isinstance(record, _Spoken):
             said = sentence_of(record) if isinstance(record, DecisionRecord) else record
             row = [_safe(reader.say(said.key, said.slots)), *row]
         rows.append(row)
@@ -121,14 +119,3 @@ def cell(value: object, reader: Sentences | None = None) -> str:
 def _safe(text: str) -> str:
     """A cell that no spreadsheet runs as a formula; our numbers stay numbers."""
     return "'" + text if text.startswith(_FORMULA) else text
-
-
-def _quality(parameters: str) -> float:
-    for parameter in parameters.split(";"):
-        name, _, value = parameter.partition("=")
-        if name.strip().lower() == "q":
-            try:
-                return float(value)
-            except ValueError:
-                return 0.0
-    return 1.0

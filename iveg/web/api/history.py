@@ -3,26 +3,24 @@
 Lists answer JSON, CSV or NDJSON, as ``Accept`` or ``format`` says.
 """
 
+import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Annotated, Any, Generic, TypeVar
 
 from fastapi import APIRouter, Depends, HTTPException, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
-from orjson import Fragment
 
 from iveg.adapters import clock
 from iveg.adapters.history import lists
-from iveg.adapters.history.lists import Filter, ListOf, Page
+from iveg.adapters.history.lists import Cursor, Filter, ListOf, Page
 from iveg.adapters.history.queries import Queries
 from iveg.domain.errors import HopError
 from iveg.domain.fleet import NOBODY, FleetDescription
 from iveg.domain.records import CommandRecord, DecisionRecord, Record
-from iveg.models.base import Listing, Row, write_json
+from iveg.models.base import Listing, Row
 from iveg.models.command import Command
-from iveg.models.dictionary import DictionaryColumn, dictionary_columns
 from iveg.models.history import (
     Alert,
     AuditEntry,
@@ -35,7 +33,7 @@ from iveg.models.history import (
 from iveg.models.people import DetectionRow
 from iveg.vital.ports import Clock
 from iveg.web.api import day, exports
-from iveg.web.api.answers import FEW_ROWS, Apart, Json
+from iveg.web.api.answers import Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
 from iveg.web.api.history_filters import Filters, filter_of
 from iveg.web.pages.sentences import Sentences, in_madrid, read_sentences
@@ -43,6 +41,7 @@ from iveg.web.security.requirements import refusals, require
 from iveg.web.security.roles import Action
 
 R = TypeVar("R", bound=Record)
+Model = Callable[..., Row]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,38 +51,27 @@ class HistoryList(Generic[R]):
     Attributes:
         shape: Model of a row.
         beside: Other rows that the models of some rows need, in their order.
-        needs: What whoever asks must be allowed.
-        of_now: Those of this moment, which no database has to be asked for.
+        needs: Right that a reader must have.
+        present: Alerts of now, which lead their list and need no database.
     """
 
     path: str
-    of: ListOf[R]
+    source: ListOf[R]
     shape: type[Row]
     says: str
     beside: Callable[[Sequence[R]], Awaitable[list[Any]]] | None = None
     needs: Action = "read"
-    of_now: Callable[[], list[Alert]] | None = None
-
-    @property
-    def model(self) -> Callable[..., Row]:
-        """Makes the model of a row, and of what ``beside`` found for it."""
-        return self.shape.from_record
-
-    @property
-    def listing(self) -> type[Listing[Any]]:
-        """A page of it."""
-        return Listing[self.shape]  # type: ignore[name-defined]
+    present: Callable[[], list[Alert]] = list
 
     async def rows(self, records: Sequence[R]) -> list[tuple[Any, ...]]:
-        """Arguments of ``model``, for each record."""
+        """Arguments of ``shape.from_record``, for each record."""
         if self.beside is None:
             return [(one,) for one in records]
         return list(zip(records, await self.beside(records), strict=True))
 
 
 def lists_of(
-    queries: Queries,
-    alerts_of_now: Callable[[], list[Alert]] = list,
+    queries: Queries, alerts: Callable[[], list[Alert]] = list
 ) -> tuple[HistoryList[Any], ...]:
     """All lists of the history."""
 
@@ -110,7 +98,7 @@ def lists_of(
             lists.ALERTS,
             Alert,
             "Every alert, by when it was last raised",
-            of_now=alerts_of_now,
+            present=alerts,
         ),
         HistoryList("log", lists.LOG, LogEntry, "The action and inference log"),
         HistoryList(
@@ -153,12 +141,6 @@ def lists_of(
     )
 
 
-_FILES: dict[str, dict[str, str]] = {
-    MEDIA_TYPES["csv"]: {},
-    MEDIA_TYPES["ndjson"]: {},
-}
-
-
 def router(
     queries: Queries,
     worker: Apart,
@@ -172,12 +154,12 @@ def router(
     """The routes of the history.
 
     Args:
-        queries: Where the past is asked for.
-        worker: Where files are written and figures drawn.
+        queries: Reading side of the history.
+        worker: Writes files and draws figures.
         threshold: Least confidence of the rule in force, marked in the chart.
         present: A decision that is still in memory; its links are those of now.
         alerts: Those of now.
-        fleet: Whose greatest speeds the chart is about.
+        fleet: Robots, whose greatest speeds a chart shows.
         read_clock: What "the last 15 minutes" end at.
     """
     routes = APIRouter(
@@ -201,14 +183,6 @@ def router(
             raise HTTPException(404, "There is no such decision.")
         return Json(Decision.from_record(found))
 
-    @routes.get(
-        "/api/v1/exports/dictionary",
-        summary="What each column of an exported list means",
-        response_model=Listing[DictionaryColumn],
-    )
-    async def dictionary() -> Listing[DictionaryColumn]:
-        return Listing(items=dictionary_columns())
-
     day.add_routes(routes, queries, worker, threshold, fleet, read_clock)
     return routes
 
@@ -220,7 +194,7 @@ def _add_list(
         f"/api/v1/{one.path}",
         name=one.path,
         summary=one.says,
-        response_model=one.listing,
+        response_model=Listing[one.shape],  # type: ignore[name-defined]
         responses={200: {"content": _FILES}, **refusals(501)},
         dependencies=[Depends(require(one.needs))],
     )
@@ -228,92 +202,78 @@ def _add_list(
         request: Request, filters: Annotated[Filters, Query()]
     ) -> Response:
         form = filters.format or exports.form_of(request.headers)
-        asked = filter_of(filters, one.of)
-        if one.of_now is not None and form == "json" and _is_plain(asked):
-            return await _with_now(queries, one, asked, one.of_now())
+        wanted = filter_of(filters, one.source)
+        if form != "json" and filters.limit is None:
+            wanted = replace(wanted, limit=lists.MOST_ROWS)
+        # The first page is read before the answer begins, so that a refusal is told.
+        is_plain = form == "json" and filters.model_fields_set <= {"limit", "format"}
+        now = one.present() if is_plain else []
+        try:
+            page = await queries.page(one.source, wanted)
+        except HopError:
+            if not now:
+                raise
+            page = Page((), None)
         if form == "json":
-            return await _listing(await queries.page(one.of, asked), one, worker)
-        return await _file(queries, one, filters, asked, form, worker)
+            rows = await one.rows(page.items)
+            model = one.shape.from_record
+            return await asyncio.to_thread(_listing, model, rows, page.next, now)
+        if filters.limit is not None:
+            page = replace(page, next=None)
+        pages = queries.pages(one.source, page, wanted)
+        body = file_parts(one, pages, form, worker.run, filters.language)
+        day_of = _day(wanted) if filters.language else ""
+        attached = f'attachment; filename="{one.path}{day_of}.{form}"'
+        return StreamingResponse(
+            body, 200, {"Content-Disposition": attached}, MEDIA_TYPES[form]
+        )
 
 
-def _is_plain(asked: Filter) -> bool:
-    return replace(asked, limit=lists.USUAL_ROWS) == Filter()
+_FILES: dict[str, dict[str, str]] = {
+    MEDIA_TYPES["csv"]: {},
+    MEDIA_TYPES["ndjson"]: {},
+}
 
 
-async def _with_now(
-    queries: Queries, one: HistoryList[R], asked: Filter, now: list[Alert]
-) -> Response:
-    """The newest page, with what memory knows better; alone where nothing else does."""
-    page: Page[R] = Page((), None)
-    with suppress(HopError):
-        page = await queries.page(one.of, asked)
-    told = {alert.alert_id for alert in now}
-    stored = [one.model(*row) for row in await one.rows(page.items)]
-    items = [*now, *(alert for alert in stored if alert.alert_id not in told)]
-    items.sort(key=lambda alert: alert.last_raised_at, reverse=True)
-    after = None if page.next is None else lists.write_cursor(page.next)
-    return Json(one.listing(items=items, next=after))
+def _listing(
+    model: Model,
+    rows: Sequence[tuple[Any, ...]],
+    cursor: Cursor | None,
+    now: Sequence[Alert],
+) -> Json:
+    items: list[Any] = [model(*row) for row in rows]
+    if now:
+        known = {one.alert_id for one in now}
+        items = [*now, *(one for one in items if one.alert_id not in known)]
+    after = None if cursor is None else lists.write_cursor(cursor)
+    return Json({"items": items, "next": after})
 
 
-async def _listing(page: Page[R], one: HistoryList[R], worker: Apart) -> Response:
-    after = None if page.next is None else lists.write_cursor(page.next)
-    rows = await one.rows(page.items)
-    if len(rows) <= FEW_ROWS:
-        items = [one.model(*row) for row in rows]
-        return Json(one.listing(items=items, next=after))
-    items_json = Fragment(await worker.run(_write_items, one.model, rows))
-    return Json({"items": items_json, "next": after})
-
-
-def _write_items(model: Callable[..., Row], rows: Sequence[tuple[Any, ...]]) -> bytes:
-    return write_json([model(*row) for row in rows])
-
-
-async def _file(
-    queries: Queries,
+async def file_parts(
     one: HistoryList[R],
-    filters: Filters,
-    asked: Filter,
-    form: Form,
-    worker: Apart,
-) -> Response:
-    """A whole list as a file; with a limit, that many rows of it."""
-    if filters.limit is None:
-        asked = replace(asked, limit=lists.MOST_ROWS)
-    # The first page is read before the answer begins, so that a refusal can be told.
-    first = await queries.page(one.of, asked)
-    if filters.limit is not None:
-        first = replace(first, next=None)
-    pages = queries.pages(one.of, first, asked)
-    if form == "csv":
-        body = _csv(one.of.kind, pages, filters.language, worker)
-    else:
-        body = _ndjson(one, pages, worker)
-    name = f"{one.path}{_day(asked) if filters.language else ''}.{form}"
-    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
-    return StreamingResponse(body, 200, headers, MEDIA_TYPES[form])
-
-
-async def _csv(
-    kind: type[R],
     pages: AsyncIterator[Sequence[R]],
-    language: str | None,
-    worker: Apart,
+    form: Form,
+    run: Callable[..., Awaitable[bytes]],
+    language: str | None = None,
 ) -> AsyncIterator[bytes]:
-    yield exports.csv_head(kind, _reader(language))
+    """A list as a file, a part for each page; ``run`` has a part written elsewhere."""
+    has_head = form == "csv"
     async for records in pages:
-        yield await worker.run(_csv_page, kind, records, language)
+        if form == "csv":
+            kind = one.source.kind
+            yield await run(_csv_page, kind, records, language, has_head=has_head)
+            has_head = False
+        else:
+            rows = await one.rows(records)
+            yield await run(exports.ndjson_rows, one.shape.from_record, rows)
 
 
-def _csv_page(kind: type[R], records: Sequence[R], language: str | None) -> bytes:
-    return exports.csv_rows(kind, records, _reader(language))
-
-
-async def _ndjson(
-    one: HistoryList[R], pages: AsyncIterator[Sequence[R]], worker: Apart
-) -> AsyncIterator[bytes]:
-    async for records in pages:
-        yield await worker.run(exports.ndjson_rows, one.model, await one.rows(records))
+def _csv_page(
+    kind: type[R], records: Sequence[R], language: str | None, *, has_head: bool
+) -> bytes:
+    reader = _reader(language)
+    head = exports.csv_head(kind, reader) if has_head else b""
+    return head + exports.csv_rows(kind, records, reader)
 
 
 @cache
@@ -321,7 +281,7 @@ def _reader(language: str | None) -> Sentences | None:
     return None if language is None else read_sentences(language)
 
 
-def _day(asked: Filter) -> str:
+def _day(wanted: Filter) -> str:
     """The first day that was asked for, for the name of the file."""
-    at = clock.wall() if asked.since is None else asked.since
+    at = clock.wall() if wanted.since is None else wanted.since
     return f"-{in_madrid(at):%Y-%m-%d}"

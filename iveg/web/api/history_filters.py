@@ -5,7 +5,6 @@ refused: a misspelt filter that answers everything would mislead.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from datetime import UTC, date, datetime
 from typing import Annotated, Literal, Self, TypeVar
 
@@ -21,7 +20,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from iveg.adapters.history import lists
-from iveg.adapters.history.lists import Cursor, Filter, ListOf
+from iveg.adapters.history.lists import Filter, ListOf
 from iveg.domain.errors import UnreadableError
 from iveg.domain.records import Record
 from iveg.vital.detections import JudgedDetection
@@ -125,13 +124,6 @@ class Filters(RowFilters):
     cursor: str | None = Field(
         None, max_length=200, description="`next` of the page before"
     )
-    sort: str = Field(
-        lists.NEWEST_FIRST,
-        max_length=16,
-        pattern=r"^-?[a-z]+$",
-        description="`at`; of decisions, orders, alerts and log also `robot`, of "
-        "orders and log `kind`, of alerts `priority`; `-` before it: downwards",
-    )
     format: Form | None = Field(None, description="Instead of an `Accept` header")
     language: Literal["es", "en"] | None = Field(
         None,
@@ -158,18 +150,18 @@ def admitting(asked: RowFilters) -> Callable[[JudgedDetection], bool]:
     return admits
 
 
-def filter_of(filters: Filters, of: ListOf[R]) -> Filter:
+def filter_of(filters: Filters, listed: ListOf[R]) -> Filter:
     """The question to the database.
 
     Raises:
-        RequestValidationError: the list cannot be sorted so; the cursor belongs to
-            another question, or to none.
+        RequestValidationError: the cursor is none of such a list.
     """
-    name = filters.sort.removeprefix("-")
-    if name not in (lists.BY_TIME, *of.sorts):
-        names = ", ".join((lists.BY_TIME, *of.sorts))
-        raise _invalid("sort", f"one of {names}, with or without a - before it")
-    asked = Filter(
+    try:
+        text = filters.cursor
+        cursor = None if text is None else lists.read_cursor(text, listed)
+    except UnreadableError as error:
+        raise _invalid("cursor", "not a cursor of this list") from error
+    return Filter(
         since=seconds(filters.since),
         until=seconds(filters.until),
         robot=filters.robot,
@@ -177,10 +169,8 @@ def filter_of(filters: Filters, of: ListOf[R]) -> Filter:
         person=filters.person,
         min_probability=filters.min_probability,
         limit=filters.limit or lists.USUAL_ROWS,
-        sort=filters.sort,
+        cursor=cursor,
     )
-    cursor = _cursor(filters.cursor, of, asked, by_time=name == lists.BY_TIME)
-    return replace(asked, cursor=cursor)
 
 
 def range_of(
@@ -203,22 +193,6 @@ def range_of(
 def seconds(moment: datetime | None) -> float | None:
     """Unix time (s); None where none was asked for."""
     return None if moment is None else moment.timestamp()
-
-
-def _cursor(
-    text: str | None, of: ListOf[R], asked: Filter, *, by_time: bool
-) -> Cursor | None:
-    if text is None:
-        return None
-    try:
-        cursor = lists.read_cursor(text, of)
-    except UnreadableError as error:
-        raise _invalid("cursor", "not a cursor of this list") from error
-    if cursor.question != lists.question_of(of, asked):
-        raise _invalid("cursor", "a cursor of another list, order or filters")
-    if (cursor.group is None) != by_time:
-        raise _invalid("cursor", "not a cursor of this list")
-    return cursor
 
 
 def _invalid(name: str, why: str) -> RequestValidationError:

@@ -88,51 +88,6 @@ async def test_pages_hold_every_row_once_though_times_are_equal_and_rows_arrive(
 
 
 @pytest.mark.parametrize(
-    ("sort", "found"),
-    [
-        ("-at", "43210"),
-        ("at", "01234"),
-        # Newest first of each robot; a line of no robot is before the first.
-        ("robot", "42031"),
-        ("-robot", "31204"),
-    ],
-)
-async def test_28_9_a_sorted_list_keeps_its_order_over_pages_and_new_rows(
-    queries: Queries, database_url: str, sort: str, found: str
-) -> None:
-    robots = ("AGI", "AGII", "AGI", "AGII", None)
-    lines = [log_record(id=n, at=NOON, robot_id=r) for n, r in enumerate(robots)]
-    remember(database_url, *lines)
-
-    ids, cursor = "", None
-    for _ in range(5):
-        page = await queries.page(lists.LOG, Filter(limit=1, sort=sort, cursor=cursor))
-        ids, cursor = ids + "".join(str(one.id) for one in page.items), page.next
-        if sort == "-at" and len(ids) == 1:
-            remember(database_url, log_record(id=9, at=NOON + 1))
-
-    assert (ids, cursor) == (found, None)
-
-
-@pytest.mark.parametrize("sort", ["robot", "-robot"])
-async def test_robots_stand_as_people_count_over_pages(
-    queries: Queries, database_url: str, sort: str
-) -> None:
-    counted = ("7", "70", "AGI", "AGII", "R1", "R1", "R2", "R10", "R100", "R10-9")
-    lines = [log_record(id=n, at=NOON, robot_id=r) for n, r in enumerate(counted)]
-    remember(database_url, *lines)
-
-    found, cursor = [], None
-    for _ in range(4):
-        page = await queries.page(lists.LOG, Filter(limit=3, sort=sort, cursor=cursor))
-        found += [one.robot_id for one in page.items]
-        cursor = page.next
-
-    wanted = counted if sort == "robot" else counted[::-1]
-    assert (found, cursor) == ([*wanted], None)
-
-
-@pytest.mark.parametrize(
     ("asked", "xs"),
     [
         (Filter(robot="AGII"), [2.0]),

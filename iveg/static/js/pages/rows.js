@@ -7,7 +7,6 @@
 import { readApi } from "../core/api.js";
 import { make, need, setHidden, setText } from "../panels/dom.js";
 import { createFilters } from "./filters.js";
-import { createSorting } from "./sorting.js";
 
 const ROWS = 50;
 
@@ -29,8 +28,6 @@ export function createRows(options) {
   let status = 200;
   let isLoaded = false;
   const filters = createFilters(name, { onRobot: load, onSearch: draw });
-  const sorting = createSorting(name, load);
-  const asks = () => filters.query() + sorting.query();
 
   function draw() {
     const own = items.filter(belongs);
@@ -59,9 +56,9 @@ export function createRows(options) {
 
   /** Null also where other rows have been asked for since. @param {string} query */
   async function read(query) {
-    const asked = asks();
+    const asked = filters.query();
     const answer = await readApi(`${path}?limit=${ROWS}${asked}${query}`);
-    if (asked !== asks()) return null;
+    if (asked !== filters.query()) return null;
     status = answer.status;
     isLoaded = true;
     return /** @type {Listing | null} */ (status === 200 ? answer.body : null);
