@@ -41,7 +41,7 @@ from iveg.robot.holds import read_holds, write_holds
 from iveg.robot.judgement import Limits, OnLinkLoss
 from iveg.robot.orders import Drive, Effect, Persist, Report, SendAnswer
 from iveg.robot.safety import SafetyMachine, State
-from iveg.robot.uplink import Form, Origins, SafetyLane, Uplink
+from iveg.robot.uplink import Origins, SafetyLane, Uplink
 
 # --- pacing -----------------------------------------------------------------------
 #
@@ -87,7 +87,6 @@ class NodeSettings:
         slow_s: Feedback older than this halves the speed (s).
         stand_s: Feedback older than this stops the robot (s).
         on_link_loss: ``slow``: it goes on at half speed instead.
-        uplink: One message a topic, or Algorithm 1's single payload.
         plan: What stands in the greenhouse; None: nobody drew it.
         replay: It plays a recording, which is in this map frame: its messages are
             marked, and echo no feedback, since their content was measured long ago.
@@ -101,7 +100,6 @@ class NodeSettings:
     slow_s: float = LIMITS.feedback_slow_s
     stand_s: float = LIMITS.feedback_stand_s
     on_link_loss: OnLinkLoss = "stop"
-    uplink: Form = "per-topic"
     plan: Plan | None = None
     replay: str | None = None
     read_clock: Callable[[], Instant] = clock.now
@@ -177,13 +175,7 @@ class RobotNode:
             echoes=None if self._is_replay else self._echoes,
             replay=settings.replay,
         )
-        self._uplink = Uplink(
-            robot_id,
-            settings.apikey,
-            origins,
-            self._link.enqueue,
-            form=settings.uplink,
-        )
+        self._uplink = Uplink(robot_id, settings.apikey, origins, self._link.enqueue)
         self._machine = SafetyMachine(
             robot_id,
             boot,
