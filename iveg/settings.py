@@ -68,6 +68,7 @@ GONE: Final = frozenset(
         "IVEG_ORION_THROTTLE",
         "IVEG_RELEASE_PROOF_MINUTES",
         "IVEG_TRUTH",
+        "IVEG_UPLINK",
     }
 )
 """Settings of earlier versions; docs/upgrading.md says what took their place."""
@@ -335,11 +336,6 @@ class Settings:
         "IVEG_KEEP_PICTURES_GB",
         4,
         "Pictures of the past (the same).",
-    )
-    uplink: Literal["per-topic", "single"] = setting(
-        "IVEG_UPLINK",
-        "per-topic",
-        "How emulated robots send: one message a topic, or one a robot.",
     )
     greenhouse: str = setting(
         "IVEG_GREENHOUSE",

@@ -3,13 +3,10 @@
 Uses Eclipse Cyclone DDS, an optional extra (``iveg[ros2]``), which nothing but this
 module imports.
 Payloads stay bytes here: DDS checks them against the type, and ``iveg.ros2.cdr`` reads
-the few that are wanted.  None of Cyclone's threads calls iVeg; one thread of ours waits
-for messages that must be answered at once and wakes the event loop.
+the few that are wanted.  None of Cyclone's threads calls iVeg: readers are polled.
 """
 
-import asyncio
-import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from functools import cache
 from types import TracebackType
@@ -24,10 +21,6 @@ from cyclonedds.builtin import (
 from cyclonedds.core import (
     DDSException,
     InstanceState,
-    ReadCondition,
-    SampleState,
-    ViewState,
-    WaitSet,
 )
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.idl import IdlStruct, make_idl_struct, types
@@ -40,7 +33,7 @@ from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 from rosbags.interfaces import Nodetype
 
-from iveg.adapters.dds_network import DdsNetwork, used_of
+from iveg.adapters.dds_network import DdsNetwork
 from iveg.domain.errors import HopError
 from iveg.ros2.cdr import read_user_data, user_data
 from iveg.ros2.messages import Message
@@ -74,15 +67,6 @@ def _leave_in_bytes(kind: type[IdlStruct]) -> None:
 def announced(message: type[Message]) -> type[IdlStruct]:
     """The type that DDS announces for a message."""
     return structure(message.STORE, message.ROS, _in_bytes)
-
-
-@cache
-def unread(message: type[Message]) -> type[IdlStruct]:
-    """A type of the same name by which DDS passes on all bytes, whatever they are.
-
-    It fits those alone who announce no fields.
-    """
-    return _in_bytes(message.ROS, {"unread": types.uint8})
 
 
 def _in_bytes(ros: str, members: dict[str, object]) -> type[IdlStruct]:
@@ -265,63 +249,6 @@ class DdsWriter:
         self._writer = None
 
 
-# --- waiting ------------------------------------------------------------------------
-#
-# A thread that waits for data of DDS and wakes the event loop.
-
-_WAIT_MS = 250
-_REARM_S = 0.002
-
-
-class DdsWatch:
-    """A thread that waits for data and wakes the loop, which takes them."""
-
-    def __init__(
-        self,
-        participant: DomainParticipant,
-        readers: Iterable[DdsReader],
-        loop: asyncio.AbstractEventLoop,
-        on_data: Callable[[], None],
-    ) -> None:
-        self._waitset = WaitSet(participant)
-        mask = SampleState.NotRead | ViewState.Any | InstanceState.Any
-        self._conditions = [ReadCondition(one.entity, mask) for one in readers]
-        for condition in self._conditions:
-            self._waitset.attach(condition)
-        self._loop, self._on_data = loop, on_data
-        self._ended = threading.Event()
-        # Nobody lets go of it: to wait for it is the cheapest rest.
-        self._rest = threading.Lock()
-        self._rest.acquire()
-        self._is_announced = False
-        self._thread = threading.Thread(target=self._wait, name="dds", daemon=True)
-        self._thread.start()
-
-    def stop(self) -> None:
-        """End the thread."""
-        self._ended.set()
-        self._thread.join()
-
-    def _wait(self) -> None:
-        while not self._ended.is_set():
-            if not self._waitset.wait(duration(milliseconds=_WAIT_MS)):
-                continue
-            if not self._is_announced:
-                self._is_announced = True
-                try:
-                    self._loop.call_soon_threadsafe(self._tell)
-                except RuntimeError:  # the loop has closed
-                    return
-            # The loop takes what came meanwhile; a flood wakes it no more often.
-            self._rest.acquire(timeout=_REARM_S)
-
-    def _tell(self) -> None:
-        # First, so that a sample which on_data just misses is announced again.
-        self._is_announced = False
-        if not self._ended.is_set():
-            self._on_data()
-
-
 # --- a participant ------------------------------------------------------------------
 
 _FATAL = 1
@@ -340,13 +267,12 @@ class Dds(AbstractContextManager["Dds"]):
     """
 
     def __init__(self, network: DdsNetwork, gate: str = "") -> None:
-        self._gate, self._network = gate, network
-        self._watches: list[DdsWatch] = []
+        self._gate = gate
         self._topics: dict[tuple[str, type], Topic] = {}
         self._own: list[DdsReader | DdsWriter] = []
         self._endpoints: dict[str, Endpoint] = {}
         try:
-            self._used = _configure(network)
+            _configure(network)
             self._participant = DomainParticipant(network.domain)
         except DDSException as error:
             detail = f"no participant on domain {network.domain}: {error.msg}"
@@ -369,9 +295,6 @@ class Dds(AbstractContextManager["Dds"]):
         trace: TracebackType | None,
     ) -> None:
         """Leave; nothing is called afterwards."""
-        for watch in self._watches:
-            watch.stop()
-        self._watches.clear()
         # Cyclone deletes an entity with its last reference, the participant last.
         for endpoint in self._own:
             endpoint.close()
@@ -382,18 +305,15 @@ class Dds(AbstractContextManager["Dds"]):
 
     # --- endpoints of ours --------------------------------------------------------
 
-    def reader(
-        self, name: str, message: type[Message], qos: Qos, *, raw: bool = False
-    ) -> "DdsReader":
-        """Subscribe to a topic by its full ROS name; ``raw``: whatever its fields."""
+    def reader(self, name: str, message: type[Message], qos: Qos) -> DdsReader:
+        """Subscribe to a topic by its full ROS name."""
         policies = self._policies(message, qos)
-        topic = self._topic(name, message, raw=raw)
-        reader = DataReader(self._participant, topic, policies)
-        made = DdsReader(reader)
+        topic = self._topic(name, message)
+        made = DdsReader(DataReader(self._participant, topic, policies))
         self._own.append(made)
         return made
 
-    def writer(self, name: str, message: type[Message], qos: Qos) -> "DdsWriter":
+    def writer(self, name: str, message: type[Message], qos: Qos) -> DdsWriter:
         """Publish on a topic by its full ROS name."""
         topic = self._topic(name, message)
         policies = self._policies(message, qos)
@@ -405,22 +325,12 @@ class Dds(AbstractContextManager["Dds"]):
         data = Policy.Userdata(user_data(message, self._gate))
         return DdsQos(data, base=write_qos(qos))
 
-    def _topic(self, name: str, message: type[Message], *, raw: bool = False) -> Topic:
-        kind = unread(message) if raw else announced(message)
-        key = name, kind
-        if key not in self._topics:
-            self._topics[key] = Topic(self._participant, dds_topic(name), kind)
-        return self._topics[key]
-
-    def watch(
-        self, readers: Sequence["DdsReader"], on_data: Callable[[], None]
-    ) -> None:
-        """Call ``on_data`` in the running loop soon after any of these has news.
-
-        It is called again 2 ms later at the earliest, however much comes.
-        """
-        loop = asyncio.get_running_loop()
-        self._watches.append(DdsWatch(self._participant, readers, loop, on_data))
+    def _topic(self, name: str, message: type[Message]) -> Topic:
+        kind = announced(message)
+        if (name, kind) not in self._topics:
+            made = Topic(self._participant, dds_topic(name), kind)
+            self._topics[name, kind] = made
+        return self._topics[name, kind]
 
     # --- endpoints of others ------------------------------------------------------
 
@@ -442,14 +352,6 @@ class Dds(AbstractContextManager["Dds"]):
                     gone.append(found)
         return *self._endpoints.values(), *gone
 
-    def unheard(self) -> tuple[str, ...]:
-        """Interfaces where nobody is met: too many, or come since the start."""
-        return tuple(
-            name
-            for name, address in self._network.interfaces().items()
-            if self._used.get(name) != address
-        )
-
     def _endpoint(self, sample: DcpsEndpoint, writes: bool) -> Endpoint | None:
         # An invalid sample tells the end of an endpoint and nothing about it.
         topic = ros_topic(sample.topic_name or "")
@@ -462,23 +364,19 @@ class Dds(AbstractContextManager["Dds"]):
             read_qos(sample.qos),
             str(sample.participant_key) == self._guid,
             *user_data_of(sample.qos),
-            sample.type_id is not None,
         )
 
 
 # --- Cyclone's side ----------------------------------------------------------------
 
-_configured: dict[int, tuple[str, dict[str, str], Domain]] = {}
+_configured: dict[int, tuple[str, Domain]] = {}
 """Cyclone takes one configuration a domain and process, at its first participant."""
 
 
-def _configure(network: DdsNetwork) -> dict[str, str]:
-    """Configure the domain; returns the interfaces that it uses."""
+def _configure(network: DdsNetwork) -> None:
     config = network.config()
     if network.domain not in _configured:
-        used = used_of(network.interfaces())
-        _configured[network.domain] = config, used, Domain(network.domain, config)
-    known, used, _ = _configured[network.domain]
+        _configured[network.domain] = config, Domain(network.domain, config)
+    known, _ = _configured[network.domain]
     if known != config:
         raise HopError("dds", f"domain {network.domain} is configured otherwise")
-    return used

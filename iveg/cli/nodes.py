@@ -31,7 +31,6 @@ def node_settings(
         slow_s=settings.feedback_slow_s,
         stand_s=settings.feedback_stand_s,
         on_link_loss=settings.on_link_loss,
-        uplink=settings.uplink,
         plan=plan,
     )
 

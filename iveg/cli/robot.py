@@ -52,7 +52,7 @@ async def check(
     fleet = load_fleet(settings.fleet, settings.robots)
     address = broker_of(settings)
     with Dds(network) as dds:
-        readers: dict[tuple[str, type[Message], bool], DdsReader] = {}
+        readers: dict[tuple[str, type[Message]], DdsReader] = {}
         link = MqttLink(address, f"check of {robot_id}")
         task = asyncio.create_task(link.run(), name="broker")
         began = clock.mono()
@@ -60,12 +60,12 @@ async def check(
             _listen(dds, config, readers)
             await asyncio.sleep(0.03)
             now = clock.now()
-            for (topic, kind, _), reader in readers.items():
+            for (topic, kind), reader in readers.items():
                 if waited := reader.take():
                     form = TOPICS[topic].form(kind.ROS) or kind
                     counts[topic] += len(waited)
                     frames[topic] = _frame(form, waited[-1])
-                    inputs.hear(topic, waited, now.mono, form=form)
+                    inputs.hear(topic, waited, now.mono, form)
             inputs.tick(now)
         broker = link.connected
         task.cancel()
@@ -77,7 +77,6 @@ async def check(
             inputs.input_faults.faults(clock.mono()),
             robot_id=robot_id,
             has_detector=fleet.of_robot(robot_id).has_detector,
-            unheard=dds.unheard(),
         )
     if not broker:
         at = f"{address.host}:{address.port}"
@@ -102,16 +101,16 @@ def _frame(form: type[Message], payload: bytes) -> str:
 def _listen(
     dds: "Dds",
     config: RobotConfig,
-    readers: "dict[tuple[str, type[Message], bool], DdsReader]",
+    readers: "dict[tuple[str, type[Message]], DdsReader]",
 ) -> None:
     """Read each topic that is published, in its type."""
     endpoints = dds.endpoints()
     for topic, name in sensed_topics(config.full_topics).items():
         depth = 2 if TOPICS[topic].role == "picture" else 200
         qos = config.qualities[topic].newest(depth)
-        for form, raw in forms_published(topic, name, endpoints):
-            if (topic, form, raw) not in readers:
-                readers[topic, form, raw] = dds.reader(name, form, qos, raw=raw)
+        for form in forms_published(topic, name, endpoints):
+            if (topic, form) not in readers:
+                readers[topic, form] = dds.reader(name, form, qos)
 
 
 def run(call: CommandCall) -> int:

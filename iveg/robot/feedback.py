@@ -20,7 +20,9 @@ from iveg.domain.wire import FORBIDDEN
 from iveg.domain.witness import KnownPeer
 from iveg.robot.gate import FREE, Ahead, Cap, known_reason, quantised
 from iveg.robot.peer_alerts import (
+    PEER_M,
     KeptAlert,
+    Neighbour,
     PeerObserver,
     PeerTopic,
     RuleRadii,
@@ -30,6 +32,7 @@ from iveg.robot.peer_alerts import (
     is_alive,
     is_inside,
     limited_free,
+    neighbour_of,
     zone_radius,
 )
 
@@ -210,6 +213,24 @@ class PeerFeedback:
             if peer is not None and not peer.stands:
                 yield from peer.ahead(name, self._radii.of("robot", now), now)
 
+    def neighbours(self, now: float) -> Iterator[Neighbour]:
+        """People and robots of messages that are young enough to give positions.
+
+        A peer whose pose stays the same message for ``zone_lasts_s`` is left out:
+        nobody knows any more where it is, or that it is there at all.
+        """
+        for name, topic in self._topics.items():
+            if now - topic.at > LIMITS.feedback_stand_s:
+                continue
+            for kept in topic.alerts.values():
+                if not kept.myself and kept.missing_since is None:
+                    yield from neighbour_of(kept.alert, self._radii, now)
+            peer = topic.peer
+            if peer is not None and now - peer.at <= LIMITS.zone_lasts_s:
+                zone_m = self._radii.of("robot", now)
+                x, y = peer.pose.x, peer.pose.y
+                yield Neighbour("robot", name, x, y, PEER_M, zone_m)
+
     def _peer(
         self, topic: PeerTopic, feedback: Feedback, now: float
     ) -> PeerObserver | None:
@@ -288,6 +309,7 @@ def _mandated(speed_limit: SpeedLimit, silence: float) -> Cap:
 MOST_AUTHORS = 4
 """More than a site has; with one more nobody knows whom to believe: half speed."""
 _COPIES_KNOWN = 64
+_MOST_NEIGHBOURS = 256
 _SILENT = Cap(HALF_SPEED, "watchdog")
 
 
@@ -329,6 +351,8 @@ class Authors:
         """In the order in which they were met."""
         self._crowded_at = float("-inf")
         self._newest: FeedbackRef | None = None
+        self.newest_stamp_s: float | None = None
+        """Stamp of the newest message, by iVeg's clock (Unix s)."""
 
     def apply(
         self,
@@ -367,6 +391,7 @@ class Authors:
         author.recent.append(feedback)
         author.peer_feedback.apply(topic, feedback, own, now)
         self._newest = FeedbackRef(boot, author.newest)
+        self.newest_stamp_s = feedback.origin.stamp_s or self.newest_stamp_s
         return True
 
     def echoes(self, now: float) -> tuple[FeedbackRef, ...]:
@@ -401,6 +426,16 @@ class Authors:
         """Peers; none where two authors speak, as they explain obstacles."""
         self._forget(now)
         return self._kept[0].peer_feedback.peers(now) if len(self._kept) == 1 else ()
+
+    def neighbours(self, now: float) -> list[Neighbour]:
+        """People and peers of all authors; two at the same place are one."""
+        found = chain.from_iterable(
+            author.peer_feedback.neighbours(now) for author in self._kept
+        )
+        places = {
+            (near.kind, round(near.x, 1), round(near.y, 1)): near for near in found
+        }
+        return [*places.values()][:_MOST_NEIGHBOURS]
 
     def _forget(self, now: float) -> None:
         last = now - LIMITS.zone_lasts_s

@@ -13,7 +13,6 @@ from typing import Literal
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import UnreadableError
-from iveg.domain.feedback import Feedback
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.goals import Goal
@@ -35,13 +34,14 @@ from iveg.domain.observations import (
 from iveg.domain.witness import Outline, Plan
 from iveg.ngsi import names
 from iveg.ngsi.codec import read_feedback
+from iveg.robot.feedback import Authors
 from iveg.robot.gate import FREE, Cap
 from iveg.robot.goals import Facts, Navigate, RobotGoals, read_goal
 from iveg.robot.holds import read_holds, write_holds
 from iveg.robot.judgement import Limits, OnLinkLoss
 from iveg.robot.orders import Drive, Effect, Persist, Report, SendAnswer
 from iveg.robot.safety import SafetyMachine, State
-from iveg.robot.uplink import Form, Origins, SafetyLane, Uplink
+from iveg.robot.uplink import Origins, SafetyLane, Uplink
 
 # --- pacing -----------------------------------------------------------------------
 #
@@ -87,7 +87,6 @@ class NodeSettings:
         slow_s: Feedback older than this halves the speed (s).
         stand_s: Feedback older than this stops the robot (s).
         on_link_loss: ``slow``: it goes on at half speed instead.
-        uplink: One message a topic, or Algorithm 1's single payload.
         plan: What stands in the greenhouse; None: nobody drew it.
         replay: It plays a recording, which is in this map frame: its messages are
             marked, and echo no feedback, since their content was measured long ago.
@@ -101,7 +100,6 @@ class NodeSettings:
     slow_s: float = LIMITS.feedback_slow_s
     stand_s: float = LIMITS.feedback_stand_s
     on_link_loss: OnLinkLoss = "stop"
-    uplink: Form = "per-topic"
     plan: Plan | None = None
     replay: str | None = None
     read_clock: Callable[[], Instant] = clock.now
@@ -131,7 +129,6 @@ class RobotNode:
         profile: Its body, and speeds of the drive.
         drive: Takes what the gate lets through; must not block.
         navigate: Takes goals of iVeg; None: the robot takes none.
-        on_feedback: Called with the topic's robot and each feedback that could be read.
     """
 
     def __init__(
@@ -142,12 +139,10 @@ class RobotNode:
         profile: RobotProfile,
         drive: Callable[[Twist2D], None],
         navigate: Navigate | None = None,
-        on_feedback: Callable[[str, Feedback], None] | None = None,
     ) -> None:
         self._id, self._drive = robot_id, drive
         self._read_clock = settings.read_clock
         self._started = self._read_clock().mono
-        self._on_feedback_read = on_feedback
         self._on_peer_scan: Callable[[str, bytes], None] | None = None
         self._asks_for_scans = False
         self._faults: tuple[RobotFault, ...] = ()
@@ -177,13 +172,7 @@ class RobotNode:
             echoes=None if self._is_replay else self._echoes,
             replay=settings.replay,
         )
-        self._uplink = Uplink(
-            robot_id,
-            settings.apikey,
-            origins,
-            self._link.enqueue,
-            form=settings.uplink,
-        )
+        self._uplink = Uplink(robot_id, settings.apikey, origins, self._link.enqueue)
         self._machine = SafetyMachine(
             robot_id,
             boot,
@@ -230,6 +219,11 @@ class RobotNode:
         twist at all, for 0.5 s.
         """
         return self._machine.may_drive
+
+    @property
+    def authors(self) -> Authors:
+        """Feedback of iVeg, with what it tells of others."""
+        return self._machine.authors
 
     @property
     def goal(self) -> Goal | None:
@@ -372,8 +366,6 @@ class RobotNode:
         peer = topic.removeprefix("/").partition("/")[0]
         self._perform(self._machine.feedback(peer, feedback, now), now)
         self._uplink.rates.note_backlog(self._machine.authors.backlog_s(), now)
-        if self._on_feedback_read is not None:
-            self._on_feedback_read(peer, feedback)
 
     # --- effects ------------------------------------------------------------------
 

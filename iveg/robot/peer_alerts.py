@@ -40,6 +40,22 @@ class KeptAlert:
 
 
 @dataclass(frozen=True, slots=True)
+class Neighbour:
+    """A person or robot in ``map``, with the radii of its body and its zone (m)."""
+
+    kind: Class
+    name: str
+    x: float
+    y: float
+    body_m: float
+    zone_m: float
+
+
+PERSON_M, PEER_M = 0.35, 0.75
+"""Radii of bodies."""
+
+
+@dataclass(frozen=True, slots=True)
 class PeerObserver:
     """The observer of a topic at the pose that iVeg reports.
 
@@ -201,6 +217,18 @@ def alert_ahead(kept: KeptAlert, radii: RuleRadii, now: float) -> Iterator[Ahead
         (x, y, _), goes = alert.position, alert.velocity
         radius_m = zone_radius(alert, radii, 0.0, now)
         yield (x, y, *goes, now - kept.at, radius_m), alerted(alert)
+
+
+def neighbour_of(
+    alert: FeedbackAlert, radii: RuleRadii, now: float
+) -> Iterator[Neighbour]:
+    """The person or robot of an alert; nothing without a place."""
+    if alert.position is not None and alert.class_ is not None:
+        x, y, _ = alert.position
+        body_m = PERSON_M if alert.class_ == "person" else PEER_M
+        zone_m = zone_radius(alert, radii, 0.0, now)
+        name = alert.class_id or alert.class_
+        yield Neighbour(alert.class_, name, x, y, body_m, zone_m)
 
 
 def alerted(alert: FeedbackAlert, *, waits: bool = True) -> Cap:

@@ -6,16 +6,11 @@ from collections import Counter, deque
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
-from typing import Literal
-
-import orjson
 
 from iveg.domain.errors import HopError
-from iveg.domain.geometry import Pose2D
 from iveg.domain.kinds import KIND_OF, MEASURED
 from iveg.domain.observations import (
     CommandAnswer,
-    Detection,
     DetectionFrame,
     FeedbackRef,
     GoalAnswer,
@@ -28,8 +23,6 @@ from iveg.domain.observations import (
     Unplaced,
 )
 from iveg.ngsi import codec, names
-from iveg.ngsi.codec.fields import write_message, write_origin
-from iveg.ngsi.codec.outgoing import write_scan, write_unread
 from iveg.robot.holds import HoldSet
 
 # --- rates ------------------------------------------------------------------------
@@ -47,8 +40,7 @@ from iveg.robot.holds import HoldSet
 # The level rises while the backlog lasts and falls slowly afterwards; after each fall
 # that was too early the next one waits twice as long. No reported backlog can raise a
 # rate above the sensor's own or lower it below these floors. Safety reports are never
-# fewer, nor are the single payloads of Algorithm 1, which hold all in one message.
-# Messages held back still go to iVeg directly.
+# fewer. Messages held back still go to iVeg directly.
 
 TOP_HZ = 30.0
 FLOOR_HZ = dict(
@@ -134,66 +126,6 @@ class UplinkRates:
             if device == suffix and share > 0.0:
                 return float((TOP_HZ / floor_hz) ** share / TOP_HZ)
         return 0.0
-
-
-# --- single -----------------------------------------------------------------------
-#
-# Algorithm 1's single payload, as the paper writes it: one message per robot and tick.
-#
-# The payload has room for one detection, so those of one frame take turns, the most
-# probable first; a scan is sent once; an empty frame, which the paper cannot express,
-# is an empty ``bounding_boxes`` beside it. ``pose`` and ``lidar_header`` carry the
-# origin.
-
-
-class SinglePayload:
-    """Collects observations until odometry triggers a message."""
-
-    def __init__(self) -> None:
-        self.scan: LaserScan | None = None
-        """The sweep that has not been sent yet."""
-        self._detections: list[Detection] = []
-        self._saw_nothing = False
-        self._unread: tuple[str | None, ...] = ()
-
-    def replace_frame(self, frame: DetectionFrame) -> None:
-        """Note a detection frame; it replaces what is left of the one before."""
-        self._detections = sorted(frame.detections, key=lambda one: one.probability)
-        self._saw_nothing = not frame.detections and not frame.unread
-        self._unread = frame.unread
-
-    def write(self, odometry: Odometry) -> bytes:
-        """Payload of ``/{apikey}/{robot}/attrs`` for this odometry tick."""
-        origin = write_origin(odometry.origin)
-        payload: dict[str, object] = {
-            "pose": write_message(odometry) | origin,
-            "timestamp": odometry.origin.stamp,
-            "TimeInstant": odometry.origin.stamp,
-        }
-        if self._detections:
-            payload |= _detected(self._detections.pop(), odometry.pose)
-        elif self._unread:
-            nowhere, self._unread = write_unread(self._unread), ()
-            payload |= {names.BOXES: nowhere, names.BOXES_HEADER: origin}
-        elif self._saw_nothing:
-            self._saw_nothing = False
-            payload |= {names.BOXES: [], names.BOXES_HEADER: origin}
-        if self.scan is not None:
-            scan = replace(self.scan, origin=odometry.origin)
-            payload |= write_scan(scan, "laser_scan")
-            self.scan = None
-        return orjson.dumps(payload, option=orjson.OPT_SERIALIZE_NUMPY)
-
-
-def _detected(detection: Detection, pose: Pose2D) -> dict[str, object]:
-    x, y, z = detection.box.centre
-    if detection.frame_id != "map":
-        x, y = pose.transform(x, y)
-    return {
-        "class": detection.class_id,
-        "conf": round(detection.probability, 4),
-        "position_3D": {"x": round(x, 4), "y": round(y, 4), "z": round(z, 4)},
-    }
 
 
 # --- lane -------------------------------------------------------------------------
@@ -315,10 +247,6 @@ class SafetyLane:
 # outdated by then. While Orion is behind, measures withheld from the agent go to iVeg
 # directly (``rates``).
 
-_IN_ONE = Odometry, LaserScan, DetectionFrame
-"""Kinds in the single payload of Algorithm 1."""
-Form = Literal["per-topic", "single"]
-
 _UNPLACED = {"odometry": Odometry, "scan": LaserScan}
 _SAFETY = KIND_OF[SafetyReport].suffix or ""
 _ANSWERS, _GOALS = "cmdexe", "goal"
@@ -375,7 +303,6 @@ class Uplink:
         apikey: First part of its topics.
         origins: Gives each message its place in the count.
         enqueue: Takes telemetry; the newest of a topic wins.
-        form: One message a topic, or Algorithm 1's single payload.
 
     Moments are the robot's own: monotonic seconds since its boot, and its wall clock.
     """
@@ -386,28 +313,25 @@ class Uplink:
         apikey: str,
         origins: Origins,
         enqueue: Callable[[str, bytes], None],
-        *,
-        form: Form = "per-topic",
     ) -> None:
         self._id = robot_id
         self._apikey = apikey
         self._origins = origins
         self._enqueue = enqueue
-        self._single = SinglePayload() if form == "single" else None
         self._looked: tuple[tuple[str, int], ...] = ()
         self.rates = UplinkRates()
 
     def send(self, observation: Observation, at: Instant) -> None:
         """Send an observation of this moment."""
-        if self._single is not None and isinstance(observation, _IN_ONE):
-            self._send_single(self._single, observation, at)
-            return
         news = isinstance(observation, DetectionFrame) and self._is_news(observation)
         suffix = _suffix_of(observation)
         origin = self._origins.next(suffix, at)
         stamped = replace(observation, robot_id=self._id, origin=origin)
         payload = codec.write_measure(stamped)
-        self._emit(suffix, payload, at.mono, news=news)
+        if self.rates.is_measure(suffix, at.mono, news=news):
+            self._enqueue(self._topic(suffix), payload)
+        else:
+            self._enqueue(names.direct_topic(self._id, suffix), payload)
 
     def _is_news(self, frame: DetectionFrame) -> bool:
         """Whether the detected classes or their level of confidence changed."""
@@ -439,26 +363,6 @@ class Uplink:
         origin = self._origins.next(_GOALS, at)
         topic = names.answer_topic(self._apikey, self._id)
         return topic, codec.write_answer(replace(answer, origin=origin))
-
-    def _send_single(
-        self, single: SinglePayload, observation: Observation, at: Instant
-    ) -> None:
-        if isinstance(observation, LaserScan):
-            single.scan = observation
-        elif isinstance(observation, DetectionFrame):
-            single.replace_frame(observation)
-        elif isinstance(observation, Odometry):
-            origin = self._origins.next("", at)
-            payload = single.write(replace(observation, origin=origin))
-            self._emit("", payload, at.mono)
-
-    def _emit(
-        self, suffix: str, payload: bytes, now: float, *, news: bool = False
-    ) -> None:
-        if self.rates.is_measure(suffix, now, news=news):
-            self._enqueue(self._topic(suffix), payload)
-        else:
-            self._enqueue(names.direct_topic(self._id, suffix), payload)
 
     def _topic(self, suffix: str) -> str:
         return names.measure_topic(self._apikey, self._id + suffix)

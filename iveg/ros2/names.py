@@ -50,7 +50,6 @@ class Endpoint:
         own: It is of this process.
         type_hash: As announced, ``RIHS01_…``; empty before ROS 2 Iron.
         gate: Id of the robot whose gate has it; empty: no gate of iVeg.
-        typed: It announces the fields of its type; nodes of ROS 2 do not.
     """
 
     topic: str
@@ -60,7 +59,6 @@ class Endpoint:
     own: bool
     type_hash: str = ""
     gate: str = ""
-    typed: bool = False
 
 
 DEFAULT = Qos()

@@ -135,14 +135,12 @@ from tests.unit.vital.desk import Desk, conditions_of
 import asyncio
 
 sent = {}
-for form in ("per-topic", "single"):
-    uplink = Uplink("AGI", "iveg", Origins("boot"), sent.__setitem__, form=form)
-    uplink.send(SoilMoisture("", codec.read_measure, 12.5), Instant(1.0, 1.7e9))
-    ((topic, payload),) = sent.items()
-    assert topic == "/iveg/AGI_soil_moisture/attrs", topic
-    (read,) = codec.read_measure("AGI_soil_moisture", payload).observations
-    assert isinstance(read, SoilMoisture) and read.percentage == 12.5, read
-    sent.clear()
+uplink = Uplink("AGI", "iveg", Origins("boot"), sent.__setitem__)
+uplink.send(SoilMoisture("", codec.read_measure, 12.5), Instant(1.0, 1.7e9))
+((topic, payload),) = sent.items()
+assert topic == "/iveg/AGI_soil_moisture/attrs", topic
+(read,) = codec.read_measure("AGI_soil_moisture", payload).observations
+assert isinstance(read, SoilMoisture) and read.percentage == 12.5, read
 wet = codec.read_attributes("AGI", {"soil_moisture": {"percentage": 101}})
 assert [one.reason for one in wet.problems] == ["bad_soil_moisture"]
 assert "soil_moisture" in {one.name for one in WANTED_OF_ALL}

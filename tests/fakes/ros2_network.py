@@ -1,7 +1,6 @@
 """A network of ROS 2 in memory: what was published on it, and what waits to be read."""
 
 from collections import defaultdict
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,7 +26,6 @@ class Reader:
     """A subscription."""
 
     waiting: list[bytes] = field(default_factory=list)
-    writers: int = 1
 
     def take(self) -> list[bytes]:
         found, self.waiting = self.waiting, []
@@ -57,17 +55,10 @@ class FakeNetwork:
         self.readers: dict[str, Reader] = defaultdict(Reader)
         self.writers: dict[str, Writer] = {}
         self.others: list[Endpoint] = []
-        self.deaf_on: list[str] = []
-        self.raw: set[str] = set()
         self.asked: dict[str, tuple[type[Message], Qos]] = {}
-        self._watched: list[tuple[list[Any], Callable[[], None]]] = []
 
-    def reader(
-        self, name: str, message: type[Message], qos: Qos, *, raw: bool = False
-    ) -> Reader:
+    def reader(self, name: str, message: type[Message], qos: Qos) -> Reader:
         self.asked[name] = message, qos
-        if raw:
-            self.raw.add(name)
         return self.readers[name]
 
     def writer(self, name: str, message: type[Message], qos: Qos) -> Writer:
@@ -77,16 +68,6 @@ class FakeNetwork:
     def endpoints(self) -> list[Endpoint]:
         return self.others
 
-    def unheard(self) -> list[str]:
-        return self.deaf_on
-
-    def watch(self, readers: list[Any], on_data: Callable[[], None]) -> None:
-        self._watched.append((readers, on_data))
-
     def publish(self, topic: str, message: Message, times: int = 1) -> None:
         """Somebody else publishes."""
-        arrived = cdr.write(message)
-        self.readers[topic].waiting += [arrived] * times
-        for readers, on_data in self._watched:
-            if self.readers[topic] in readers:
-                on_data()
+        self.readers[topic].waiting += [cdr.write(message)] * times

@@ -205,17 +205,6 @@ def test_a_reader_that_joins_while_readers_are_counted_is_counted(
     assert writer.readers == 2
 
 
-def test_an_interface_that_came_after_the_start_is_told(
-    dds: Dds, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert dds.unheard() == ()
-
-    later = {"lo": "127.0.0.1", "wlan0": "192.0.2.7"}
-    monkeypatch.setattr(DdsNetwork, "interfaces", lambda _: later)
-
-    assert dds.unheard() == ("wlan0",)
-
-
 def test_a_process_that_was_killed_is_gone_within_seconds(
     dds: Dds, talker: subprocess.Popen[bytes]
 ) -> None:

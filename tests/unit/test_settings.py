@@ -42,7 +42,6 @@ BAD = [
     ("IVEG_SSO_ROLES", "growers=owner", "values of the claim and roles"),
     ("IVEG_SSO_ROLES", "a=admin,a=viewer", "values of the claim and roles"),
     ("IVEG_SSO_HOURS", "25", "a number of hours from 0.25 to 24"),
-    ("IVEG_UPLINK", "both", "one of per-topic, single"),
     ("IVEG_ON_LINK_LOSS", "drive", "one of stop, slow"),
 ]
 SECRET = [
@@ -173,7 +172,6 @@ GOOD = {
     "IVEG_KEEP_RECORDINGS_DAYS": "3",
     "IVEG_KEEP_RECORDINGS_GB": "0",
     "IVEG_KEEP_PICTURES_GB": "1",
-    "IVEG_UPLINK": "single",
     "IVEG_GREENHOUSE": "none",
     "IVEG_MESSAGES_FILE": "messages.toml",
     "IVEG_EQUIPMENT": "demo",

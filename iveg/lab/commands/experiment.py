@@ -268,7 +268,6 @@ class Lab:
             "fiware": "embedded" if self.embedded else "named",
             **by_keys(settings.rule),
             "direct_read": settings.direct_read,
-            "uplink": settings.uplink,
         }
 
 

@@ -36,25 +36,16 @@ class Lookout:
     ) -> None:
         self._config, self._names = config, config.full_topics
         self._input_faults = input_faults
-        self._alone_since = self._unheard_since = now
+        self._unheard_since = now
 
-    def look(
-        self, endpoints: Iterable[Endpoint], unheard: Iterable[str], now: float
-    ) -> None:
-        """Judge the endpoints of this moment, and interfaces where nobody is met."""
-        for interface in unheard:
-            self._input_faults.note("network_unheard", interface, now)
+    def look(self, endpoints: Iterable[Endpoint], now: float) -> None:
+        """Judge the endpoints of this moment."""
         others = [one for one in endpoints if not one.own]
         out = self._names["cmd_vel_out"]
         if any(one.writes and one.topic == out for one in others):
             self._input_faults.note("second_publisher", out, now)
-        if others:
-            self._alone_since = now
-            self._note_unheard(others, now)
-            self._note_types(others, now)
-        elif now - self._alone_since > _MET_WITHIN_S:
-            domain = f"DDS {self._config.domain}"
-            self._input_faults.note("nobody_there", domain, now)
+        self._note_unheard(others, now)
+        self._note_types(others, now)
 
     def _note_unheard(self, others: Sequence[Endpoint], now: float) -> None:
         """A base that cannot hear the gate obeys no STOP either."""
@@ -97,18 +88,19 @@ def _short(ros_type: str) -> str:
 
 def forms_published(
     topic: str, name: str, endpoints: Iterable[Endpoint]
-) -> list[tuple[type[Message], bool]]:
-    """Types in which others publish a topic (key and full name), of those read.
-
-    True beside one says that its messages have to be taken whatever their fields are.
-    """
-    found: dict[tuple[type[Message], bool], None] = {}
-    for one in endpoints:
-        form = TOPICS[topic].form(one.type)
-        if one.writes and not one.own and one.topic == name and form is not None:
-            forms = definitions(form) if one.typed else (form,)
-            found |= dict.fromkeys((kind, not one.typed) for kind in forms)
-    return list(found)
+) -> list[type[Message]]:
+    """Types in which others publish a topic (key and full name), of those read."""
+    published = {
+        one.type
+        for one in endpoints
+        if one.writes and not one.own and one.topic == name
+    }
+    return [
+        kind
+        for form in TOPICS[topic].forms
+        if form.ROS in published
+        for kind in definitions(form)
+    ]
 
 
 # --- checking ---------------------------------------------------------------------
@@ -148,7 +140,6 @@ def judge(
     *,
     robot_id: str,
     has_detector: bool,
-    unheard: Iterable[str] = (),
 ) -> tuple[CheckRow, ...]:
     """Evaluate a few seconds; the robot's own gate may run beside the check.
 
@@ -159,12 +150,11 @@ def judge(
         faults: Present faults of the gate's inputs.
         robot_id: The robot.
         has_detector: The fleet file says so.
-        unheard: Interfaces where nobody is met.
     """
     names = config.full_topics
     others = [one for one in endpoints if not one.own and one.gate != robot_id]
     noted = InputFaults()
-    Lookout(config, noted, -math.inf).look(others, unheard, 0.0)
+    Lookout(config, noted, -math.inf).look(others, 0.0)
     verdicts: dict[str, list[str]] = {}
     for fault in (*faults, *noted.faults(0.0)):
         about, _, why = fault.about.partition(": ")

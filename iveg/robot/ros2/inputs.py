@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any, Literal
 
 from iveg.domain.errors import UnreadableError
+from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import (
     UNKNOWN_ORIGIN,
     Instant,
@@ -28,7 +29,6 @@ from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.detections import Boxes, Camera, Places
 from iveg.robot.ros2.reading import InputFaults
 from iveg.robot.ros2.topics import ROS_SENSORS, TOPICS, RosSensor
-from iveg.robot.ros2.transforms import RigidTransform
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as ros
 from iveg.ros2.messages import Message
@@ -119,11 +119,10 @@ class SensorInputs:
             "path": self._path,
         }
 
-    @property
-    def place(self) -> RigidTransform | None:
-        """Newest pose of the robot in ``map``."""
+    def pose(self) -> Pose2D | None:
+        """Newest pose of the robot in ``map``; None while it is not localised."""
         here = self._places.here
-        return None if here is None else here.in_map
+        return None if here is None else here.in_map.flat()
 
     # --- messages -----------------------------------------------------------------
 
@@ -132,7 +131,6 @@ class SensorInputs:
         topic: str,
         arrived: Sequence[bytes],
         now: float,
-        most: int = 0,
         form: type[Message] | None = None,
     ) -> None:
         """Note pending messages of a topic that is read.
@@ -141,13 +139,10 @@ class SensorInputs:
             topic: Its key.
             arrived: At least one, oldest first.
             now: Monotonic (s).
-            most: Depth of its queue; 0: any number is normal.
             form: Their type, where the topic may have several.
         """
         message = form or TOPICS[topic].message
         self._first_heard = min(self._first_heard, now)
-        if most and len(arrived) >= most:
-            self._note("flood", topic, now)
         if topic not in _TREE:
             self._newest[topic] = message, arrived[-1]
             return
@@ -155,11 +150,6 @@ class SensorInputs:
             links = self._read(topic, message, one, now)
             if links is not None:
                 self._places.add(links, static=topic == "tf_static")
-
-    def note_unreadable(self, topic: str, form: type[Message], now: float) -> None:
-        """Note that a topic comes in other fields than those of its type."""
-        about = f"{self._names[topic]}: {form.ROS.replace('/msg/', '/')}"
-        self.input_faults.note("unreadable", about, now)
 
     def tick(self, now: Instant) -> list[Observation]:
         """New observations, odometry first."""
@@ -213,7 +203,8 @@ class SensorInputs:
         try:
             return cdr.read(form, payload)
         except UnreadableError:
-            self.note_unreadable(topic, form, now)
+            about = f"{self._names[topic]}: {form.ROS.replace('/msg/', '/')}"
+            self.input_faults.note("unreadable", about, now)
             return None
 
     def _is_new(self, topic: str, stamp: float, now: Instant) -> bool:

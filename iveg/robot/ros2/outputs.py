@@ -4,7 +4,7 @@ import asyncio
 import logging
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,9 @@ from iveg.domain.costmap import UNKNOWN, InflatedGrid
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.goals import Goal
-from iveg.robot.costmap import FleetCostmap, Neighbour, Neighbours
+from iveg.robot.costmap import FleetCostmap
+from iveg.robot.node import RobotNode
+from iveg.robot.peer_alerts import Neighbour
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.reading import InputFaults, read_twist, write_twist
 from iveg.ros2 import cdr
@@ -33,10 +35,6 @@ class Reader(Protocol):
     def take(self) -> Sequence[bytes]:
         """All pending messages, oldest first."""
 
-    @property
-    def writers(self) -> int:
-        """Number of publishers that it hears."""
-
 
 class Writer(Protocol):
     """A publication."""
@@ -52,22 +50,14 @@ class Writer(Protocol):
 class Network(Protocol):
     """One participant."""
 
-    def reader(
-        self, name: str, message: type[Message], qos: Qos, *, raw: bool = False
-    ) -> Reader:
-        """Subscribe; ``raw``: to all of this name, whatever their fields are."""
+    def reader(self, name: str, message: type[Message], qos: Qos) -> Reader:
+        """Subscribe."""
 
     def writer(self, name: str, message: type[Message], qos: Qos) -> Writer:
         """Publish."""
 
     def endpoints(self) -> Sequence[Endpoint]:
         """All writers and readers on the network."""
-
-    def unheard(self) -> Sequence[str]:
-        """Interfaces of this machine where nobody is met."""
-
-    def watch(self, readers: list[Any], on_data: Callable[[], None]) -> None:
-        """Call ``on_data`` soon after new data."""
 
 
 # --- drive ------------------------------------------------------------------------
@@ -173,9 +163,9 @@ def cloud(
 ) -> ros.PointCloud2:
     """Discs to mark and a circle to clear, in ``base_link``."""
     discs = [
-        _disc(one, own)
-        for one in neighbours
-        if own.distance_to(one.x, one.y) <= REACH_M
+        _disc(near, own)
+        for near in neighbours
+        if own.distance_to(near.x, near.y) <= REACH_M
     ]
     points = np.ascontiguousarray(np.concatenate([_CIRCLE, *discs]), "<f4")
     return ros.PointCloud2(
@@ -202,12 +192,12 @@ _CIRCLE = np.stack(
 )
 
 
-def _disc(one: Neighbour, own: Pose2D) -> NDArray[np.float64]:
+def _disc(near: Neighbour, own: Pose2D) -> NDArray[np.float64]:
     c, s = math.cos(own.yaw), math.sin(own.yaw)
-    dx, dy = one.x - own.x, one.y - own.y
-    steps = np.arange(-one.radius, one.radius + _SPACING_M / 2, _SPACING_M)
+    dx, dy = near.x - own.x, near.y - own.y
+    steps = np.arange(-near.body_m, near.body_m + _SPACING_M / 2, _SPACING_M)
     x, y = (side.reshape(-1) for side in np.meshgrid(steps, steps))
-    inside = np.hypot(x, y) <= one.radius
+    inside = np.hypot(x, y) <= near.body_m
     x, y = x[inside], y[inside]
     return np.stack(
         (
@@ -235,20 +225,20 @@ def markers(
     """Body, radius and name of each, with a lifetime of a second."""
     header, white = ros.Header(stamp, frame), ros.ColorRGBA(1.0, 1.0, 1.0, 1.0)
     found: list[ros.Marker] = []
-    for number, one in enumerate(neighbours):
-        hue = (0.9, 0.2, 0.1) if one.kind == "person" else (0.1, 0.4, 0.9)
-        body, ring = ros.ColorRGBA(*hue, 0.9), ros.ColorRGBA(*hue, 0.15)
+    for number, near in enumerate(neighbours):
+        hue = (0.9, 0.2, 0.1) if near.kind == "person" else (0.1, 0.4, 0.9)
+        body, zone = ros.ColorRGBA(*hue, 0.9), ros.ColorRGBA(*hue, 0.15)
         for name, kind, z, width, height, color, text in (
-            ("body", _CYLINDER, 0.9, 2 * one.radius, 1.8, body, ""),
-            ("ring", _CYLINDER, 0.01, 2 * one.zone_m, 0.02, ring, ""),
-            ("name", _TEXT, 2.1, 0.0, 0.4, white, one.name),
+            ("body", _CYLINDER, 0.9, 2 * near.body_m, 1.8, body, ""),
+            ("zone", _CYLINDER, 0.01, 2 * near.zone_m, 0.02, zone, ""),
+            ("name", _TEXT, 2.1, 0.0, 0.4, white, near.name),
         ):
             marker = ros.Marker(
                 header,
-                f"{one.kind} {name}",
+                f"{near.kind} {name}",
                 number,
                 kind,
-                pose=ros.Pose(ros.Point(one.x, one.y, z)),
+                pose=ros.Pose(ros.Point(near.x, near.y, z)),
                 scale=ros.Vector3(width, width, height),
                 color=color,
                 lifetime=ros.Duration(_MARKER_LIVES_S),
@@ -274,29 +264,28 @@ class CostmapTopic:
 
     Args:
         writer: Of its topic, transient local.
-        costmap: What it knows.
-        neighbours: People and peers.
+        costmap: Its cells.
+        node: The robot's safety node, which gets feedback and scans of peers.
         frame: Name of ``map``.
-        place: Where the robot is; None while nobody knows.
-        ask: Called with whether scans of peers are wanted.
+        place: Returns the pose of the robot; None while it is not localised.
     """
 
     def __init__(
         self,
         writer: Writer,
         costmap: FleetCostmap,
-        neighbours: Neighbours,
+        node: RobotNode,
         frame: str,
         place: Callable[[], Pose2D | None],
-        ask: Callable[[bool], None],
     ) -> None:
-        self._writer, self._costmap, self._neighbours = writer, costmap, neighbours
-        self._frame, self._place, self._ask = frame, place, ask
+        self._writer, self._costmap, self._node = writer, costmap, node
+        self._frame, self._place = frame, place
         self._newest: InflatedGrid | None = None
+        node.hear_peer_scans(self._hear)
 
-    def hear(self, topic: str, payload: bytes) -> None:
-        """Take a scan of a peer."""
-        self._costmap.hear(topic, payload, self._place())
+    def _hear(self, topic: str, payload: bytes) -> None:
+        iveg_s = self._node.authors.newest_stamp_s
+        self._costmap.hear(topic, payload, self._place(), iveg_s)
 
     async def run(self) -> None:
         """Until cancelled."""
@@ -314,10 +303,10 @@ class CostmapTopic:
     async def _tell(self) -> None:
         own = self._place()
         wanted = self._writer.readers > 0
-        self._ask(wanted)
+        self._node.ask_for_peer_scans(wanted)
         if wanted and own is not None:
             now, scans = clock.now(), self._costmap.drain_scans()
-            present = self._neighbours.present(own, now.mono)
+            present = self._node.authors.neighbours(now.mono)
             self._newest = await asyncio.to_thread(
                 self._costmap.draw, scans, present, own, now.mono
             )

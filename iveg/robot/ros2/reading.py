@@ -249,8 +249,6 @@ _MOST = 16
 
 STANDS = frozenset({"second_publisher"})
 """Faults that hold the robot: another publisher on the drive bypasses the gate."""
-HARMLESS = frozenset({"unknown_to_iveg"})
-"""Faults without effect: the watchdog handles silence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,9 +304,8 @@ class InputFaults:
 
 def speed_of(faults: Iterable[RobotFault]) -> tuple[float, str | None]:
     """Speed factor allowed with these faults, and the fault that determines it."""
-    codes = [one.code for one in faults]
-    for code in codes:
-        if code in STANDS:
-            return 0.0, code
-    slow = next((code for code in codes if code not in HARMLESS), None)
-    return (FULL_SPEED if slow is None else HALF_SPEED), slow
+    codes = [fault.code for fault in faults]
+    if not codes:
+        return FULL_SPEED, None
+    stands = next((code for code in codes if code in STANDS), None)
+    return (HALF_SPEED, codes[0]) if stands is None else (0.0, stands)

@@ -7,8 +7,6 @@ import threading
 from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 
-import numpy as np
-import orjson
 import pytest
 
 from iveg.domain.errors import HopError
@@ -176,9 +174,7 @@ BLANK = Origin()
 class Wire:
     """Keeps what an uplink offered."""
 
-    def __init__(
-        self, form: str = "per-topic", heard: list[FeedbackRef] | None = None
-    ) -> None:
+    def __init__(self, heard: list[FeedbackRef] | None = None) -> None:
         self.sent: list[tuple[str, bytes]] = []
         self.uplink = Uplink(
             "AGI",
@@ -189,7 +185,6 @@ class Wire:
                 echoes=None if heard is None else lambda: tuple(heard),
             ),
             lambda topic, payload: self.sent.append((topic, payload)),
-            form="single" if form == "single" else "per-topic",
         )
 
     def read(self) -> list[object]:
@@ -248,12 +243,9 @@ def test_an_answer_goes_to_cmdexe_with_its_origin() -> None:
     assert (said.origin.boot, said.origin.seq) == ("boot-a", 1)
 
 
-@pytest.mark.parametrize("form", ["per-topic", "single"])
-def test_every_message_tells_what_had_been_heard_when_it_was_measured(
-    form: str,
-) -> None:
+def test_every_message_tells_what_had_been_heard_when_it_was_measured() -> None:
     heard: list[FeedbackRef] = []
-    wire = Wire(form, heard)
+    wire = Wire(heard)
     wire.uplink.send(odometry(origin=BLANK), AT)
     heard += [FeedbackRef("iveg", 41), FeedbackRef("other", 7)]
     for one in (scan(origin=BLANK), detection_frame("AGI", detection(), origin=BLANK)):
@@ -328,54 +320,6 @@ def test_a_look_that_sees_others_goes_through_the_agent_at_once(
     ]
 
 
-# --- the single payload -------------------------------------------------------------
-
-
-def test_the_single_payload_leaves_once_an_odometry_tick() -> None:
-    wire = Wire("single")
-    wire.uplink.send(scan(origin=BLANK), AT)
-    wire.uplink.send(detection_frame("AGI", detection(), origin=BLANK), AT)
-    assert wire.sent == []
-    wire.uplink.send(odometry(origin=BLANK), AT)
-    ((topic, payload),) = wire.sent
-    assert topic == "/iveg/AGI/attrs"
-    fields = {"class", "conf", "position_3D", "pose", "laser_scan", "timestamp"}
-    assert fields <= orjson.loads(payload).keys()
-
-
-def test_iveg_reads_pose_scan_and_detection_from_the_single_payload() -> None:
-    wire = Wire("single")
-    sweep = scan(ranges=[1.0, np.inf, 2.0], angle_min=-1.0, origin=BLANK)
-    found = detection("farmer", 3.0, 4.0, probability=0.9)
-    wire.uplink.send(sweep, AT)
-    wire.uplink.send(detection_frame("AGI", found, origin=BLANK), AT)
-    wire.uplink.send(odometry(x=1.0, y=2.0, yaw=0.5, origin=BLANK), AT)
-    pose, swept, looked = wire.read()
-    assert isinstance(pose, Odometry)
-    assert (pose.pose.x, pose.pose.y, pose.origin.seq) == (1.0, 2.0, 1)
-    assert isinstance(swept, LaserScan)
-    assert swept.angle_min == -1.0
-    assert np.array_equal(swept.ranges, sweep.ranges)
-    assert isinstance(looked, DetectionFrame)
-    assert looked.detections[0].class_id == "farmer"
-    assert looked.detections[0].box.centre[:2] == pytest.approx((3.0, 4.0))
-
-
-def test_several_detections_of_one_look_take_turns_surest_first() -> None:
-    wire = Wire("single")
-    look = detection_frame(
-        "AGI",
-        detection(probability=0.81),
-        detection(probability=0.95),
-        origin=BLANK,
-    )
-    wire.uplink.send(look, AT)
-    for _ in range(3):
-        wire.uplink.send(odometry(origin=BLANK), AT)
-    told = [orjson.loads(payload).get("conf") for _, payload in wire.sent]
-    assert told == [0.95, 0.81, None]
-
-
 # --- unplaced ---------------------------------------------------------------------
 
 UNREAD = ("farmer", None)
@@ -406,19 +350,6 @@ def test_iveg_counts_what_has_no_place_and_places_nothing(
 
     assert reading.observations == ()
     assert [problem.reason for problem in reading.problems] == ["unplaced"]
-
-
-def test_the_single_payload_does_not_call_them_an_empty_look() -> None:
-    wire: list[bytes] = []
-    uplink = Uplink(
-        "AGI", "iveg", Origins("b"), lambda _, raw: wire.append(raw), form="single"
-    )
-
-    uplink.send(DetectionFrame("", Origin(), (), UNREAD), START)
-    uplink.send(odometry(), START)
-
-    found = codec.read_measure("AGI", wire[0]).observations
-    assert [one.unread for one in found if isinstance(one, DetectionFrame)] == [UNREAD]
 
 
 # --- how it drives ------------------------------------------------------------------

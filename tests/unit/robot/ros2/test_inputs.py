@@ -87,7 +87,7 @@ def test_an_old_transform_is_named_with_its_age_and_places_nothing() -> None:
     (fault,) = bench.inputs.input_faults.faults(said.MONO + 2.1)
     assert (fault.code, fault.about) == ("no_transform", "map → odom")
     assert fault.for_s == pytest.approx(2.1)
-    assert bench.inputs.place is None
+    assert bench.inputs.pose() is None
 
 
 def test_silence_of_odometry_is_named_from_the_start() -> None:

@@ -10,7 +10,8 @@ from iveg.domain.feedback import Feedback, FeedbackAlert
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.observations import Origin
 from iveg.domain.parameters import Class
-from iveg.robot.costmap import Neighbour, Neighbours
+from iveg.robot.feedback import Authors
+from iveg.robot.peer_alerts import Neighbour
 from iveg.robot.ros2 import outputs
 from iveg.robot.ros2.config import DriveConfig, RobotConfig
 from iveg.robot.ros2.outputs import DriveTopics
@@ -107,11 +108,11 @@ def told(*alerts: FeedbackAlert, who: str = "AGII", x: float = 9.0) -> Feedback:
     return Feedback(who, Origin("c", 1), None, alerts, Pose2D(x, 2.0, 0.0))
 
 
-def present(*feedback: Feedback, age: float = 0.0) -> list[Neighbour]:
-    known = Neighbours("AGI")
+def present(*feedback: Feedback) -> list[Neighbour]:
+    known = Authors("AGI", 1.0)
     for one in feedback:
-        known.note(one.robot_id, one, 10.0)
-    return known.present(HERE, 10.0 + age)
+        known.apply(one.robot_id, one, HERE, None, 10.0)
+    return known.neighbours(10.0)
 
 
 def points(cloud: ros.PointCloud2) -> np.ndarray:
@@ -135,16 +136,17 @@ def test_a_person_within_reach_of_the_hand_is_not_taken_for_oneself() -> None:
 def test_a_peer_that_was_taken_away_leaves_although_its_last_pose_is_still_told() -> (
     None
 ):
-    known, moved = Neighbours("AGI"), "2026-11-24T08:00:00Z"
+    known, moved = Authors("AGI", 1.0), "2026-11-24T08:00:00Z"
     left = replace(told(), pose_stamp="2026-11-24T07:59:59Z")
-    known.note("AGII", left, 10.0)
-    for second in range(11, 22):
-        known.note("AGII", left, float(second))
-        assert bool(known.present(HERE, float(second))) == (second <= 20)
+    for second in range(11, 23):
+        again = replace(left, origin=Origin("c", second))
+        known.apply("AGII", again, HERE, None, float(second))
+        assert bool(known.neighbours(float(second))) == (second <= 21)
 
-    known.note("AGII", replace(left, pose_stamp=moved), 22.0)
+    back = replace(left, origin=Origin("c", 23), pose_stamp=moved)
+    known.apply("AGII", back, HERE, None, 23.0)
 
-    assert [one.name for one in known.present(HERE, 22.0)] == ["AGII"]
+    assert [one.name for one in known.neighbours(23.0)] == ["AGII"]
 
 
 def test_a_person_becomes_a_disc_in_the_robots_own_frame() -> None:
@@ -161,13 +163,13 @@ def test_a_person_becomes_a_disc_in_the_robots_own_frame() -> None:
     assert len(near) > 20
 
 
-def test_rviz_gets_a_body_a_ring_and_a_name_that_fade() -> None:
+def test_rviz_gets_a_body_a_zone_and_a_name_that_fade() -> None:
     person = Neighbour("person", "farmer", 1.0, 4.0, 0.35, 2.5)
 
-    body, ring, name = outputs.markers([person], STAMP, "map").markers
+    body, zone, name = outputs.markers([person], STAMP, "map").markers
 
-    assert (body.scale.x, ring.scale.x) == (0.7, 5.0)
+    assert (body.scale.x, zone.scale.x) == (0.7, 5.0)
     assert (name.text, name.type) == ("farmer", 9)
-    assert {one.lifetime.sec for one in (body, ring, name)} == {1}
-    assert len({(one.ns, one.id) for one in (body, ring, name)}) == 3
+    assert {one.lifetime.sec for one in (body, zone, name)} == {1}
+    assert len({(one.ns, one.id) for one in (body, zone, name)}) == 3
     assert body.header.frame_id == "map"
