@@ -14,7 +14,7 @@ _TO_DO = """
     adapters/worker app/door cli/robot comfort/messenger comfort/shadow_run
     domain/accounts domain/audit domain/kinds domain/observations domain/peer_scan
     domain/probe domain/quantities domain/transports lab/commands/experiment
-    lab/emulator/scenarios lab/emulator/world lab/experiment/desired_states
+    lab/emulator/scenarios lab/emulator/world
     lab/experiment/protection lab/experiment/report lab/experiment/scoring
     lab/experiment/stage lab/experiment/tables ngsi/codec/attributes
     ngsi/codec/feedback setting_types settings vital/__init__ vital/evaluate

@@ -67,14 +67,6 @@ def _add_experiment(experiment: argparse.ArgumentParser) -> None:
             f"--{name}", dest="size", action="store_const", const=name, help=extent
         )
     run.set_defaults(size="quick")
-    run.add_argument(
-        "--fiware",
-        nargs="+",
-        default=["embedded"],
-        metavar="URL",
-        help="a FIWARE of its own (embedded, the usual), the one that the settings "
-        "name (settings), or Orion's address, the IoT Agent's and the broker's",
-    )
     run.add_argument("--profile", choices=("field", "simulation"), default="field")
     run.add_argument("--seed", type=int, metavar="S")
     run.add_argument("--out", type=Path, metavar="DIR", help="where results go")

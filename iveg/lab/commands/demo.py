@@ -81,18 +81,13 @@ def _free_domain() -> int:
     raise SettingsError("ROS_DOMAIN_ID", "any", "a DDS domain that is free")
 
 
-def on_free_ports(
-    settings: Settings, environment: Mapping[str, str], *, fiware: bool = True
-) -> Settings:
-    """Move defaults whose port is taken to a free port; chosen addresses stay.
-
-    Without ``fiware`` only the page moves: a running FIWARE stays where it is.
-    """
+def on_free_ports(settings: Settings, environment: Mapping[str, str]) -> Settings:
+    """Move defaults whose port is taken to a free port; chosen addresses stay."""
     changes: dict[str, Any] = {}
     page = _moved(environment, "IVEG_PORT", settings.host, settings.port)
     if page is not None:
         changes["port"] = page
-    for field, variable, default in _FIWARE if fiware else ():
+    for field, variable, default in _FIWARE:
         parts = urlsplit(getattr(settings, field))
         host = parts.hostname or ""
         if host not in LOOPBACK:

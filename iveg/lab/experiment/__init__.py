@@ -4,6 +4,5 @@
 (``stage``), which gives the counts, and with the real programs, which
 ``commands/experiment`` starts and ``messages`` listens to.  ``scoring`` and
 ``protection`` compare both with the emulator's ground truth, ``outcome`` gives the
-results and writes raw data, ``desired_states`` gives a site its robots back, ``tables``
-and ``report`` present the results beside the paper.
+results and writes raw data, ``report`` presents them beside the paper.
 """

@@ -7,13 +7,11 @@ topics and by subscriptions of our own at Orion, and decoded when the run is ove
 
 import asyncio
 import contextlib
-import ssl
 import threading
 from collections.abc import AsyncIterator, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from http import HTTPStatus
 from typing import Final
-from urllib.parse import urlsplit
 
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
@@ -26,7 +24,6 @@ from iveg.adapters.reconciler import (
     WantedSubscription,
     write_subscription,
 )
-from iveg.app.outside import open_fiware
 from iveg.cli.nodes import broker_of
 from iveg.domain.clock_offset import LONGEST_S, STAMP_S
 from iveg.domain.errors import HopError, UnreadableError
@@ -78,20 +75,21 @@ class MessageTimes:
 def counts_of(times: Iterable[MessageTimes]) -> dict[Data, dict[str, int]]:
     """Messages at the broker; of these lost, out of order, or first at Orion."""
     counts = {data: dict.fromkeys(COUNTS, 0) for data in DATA}
-    came = []
-    for one in times:
-        count = counts[one.data]
+    copies = []
+    for message in times:
+        count = counts[message.data]
         count["sent"] += 1
-        if one.orion is None:
+        if message.orion is None:
             count["lost"] += 1
         else:
-            count["orion_first"] += one.orion < one.broker
-            came.append((one.orion, one))
+            count["orion_first"] += message.orion < message.broker
+            copies.append((message.orion, message))
     newest: dict[tuple[str, Data, str], int] = {}
-    for _, one in sorted(came, key=lambda each: each[0]):
-        stream = one.robot_id, one.data, one.boot
-        counts[one.data]["reordered"] += one.seq < newest.get(stream, one.seq)
-        newest[stream] = max(one.seq, newest.get(stream, one.seq))
+    for _, message in sorted(copies, key=lambda copy: copy[0]):
+        stream = message.robot_id, message.data, message.boot
+        before = newest.get(stream, message.seq)
+        counts[message.data]["reordered"] += message.seq < before
+        newest[stream] = max(message.seq, before)
     return counts
 
 
@@ -100,9 +98,9 @@ def hops_of(times: Iterable[MessageTimes]) -> dict[Data, dict[Segment, list[floa
     took: dict[Data, dict[Segment, list[float]]] = {
         data: {hop: [] for hop in HOPS} for data in DATA
     }
-    for one in times:
-        for hop, duration in (one.hops or {}).items():
-            took[one.data][hop].append(round(1000.0 * duration, 3))
+    for message in times:
+        for hop, duration in (message.hops or {}).items():
+            took[message.data][hop].append(round(1000.0 * duration, 3))
     return took
 
 
@@ -111,7 +109,7 @@ DESCRIPTION: Final = "iVeg experiment, times of messages"
 LAST_COPIES_S: Final = 2.0
 """Wait for Orion's copies of the last messages (s)."""
 _SUBSCRIBED_WITHIN_S = 5.0
-_SETTLED_S, _SETTLES_WITHIN_S, _LOOK_EVERY_S = 0.5, 60.0, 0.5
+_HOST = "127.0.0.1"
 
 
 class MessageRecorder:
@@ -120,75 +118,45 @@ class MessageRecorder:
     def __init__(self) -> None:
         # Steps of the wall clock must not get between two readings.
         self._since = clock.wall() - clock.mono()
-        self._heard: list[tuple[float, str, bytes]] = []
+        self._published: list[tuple[float, str, bytes]] = []
         self._notified: list[tuple[float, bytes]] = []
 
-    def heard(self, topic: str, payload: bytes) -> None:
-        """The broker has passed a message on."""
-        self._heard.append((self._now, topic, payload))
+    def take_publication(self, topic: str, payload: bytes) -> None:
+        """Note a message that the broker has passed on."""
+        self._published.append((self._since + clock.mono(), topic, payload))
 
-    def notified(self, body: bytes) -> tuple[HTTPStatus, str]:
-        """Orion has posted a notification."""
-        self._notified.append((self._now, body))
+    def take_notification(self, body: bytes) -> tuple[HTTPStatus, str]:
+        """Note a notification that Orion has posted."""
+        self._notified.append((self._since + clock.mono(), body))
         return HTTPStatus.NO_CONTENT, ""
-
-    @property
-    def _now(self) -> float:
-        return self._since + clock.mono()
-
-    async def settle(self, within_s: float = _SETTLES_WITHIN_S) -> bool:
-        """Wait until Orion keeps up: robots start at full rate behind a backlog.
-
-        Returns:
-            Whether it does.
-        """
-        deadline = clock.mono() + within_s
-        in_time = 0
-        while in_time < 2 and clock.mono() < deadline:
-            await asyncio.sleep(_LOOK_EVERY_S)
-            in_time = in_time + 1 if self._lag_s < _SETTLED_S else 0
-        return in_time == 2
-
-    @property
-    def _lag_s(self) -> float:
-        """Age of the newest of Orion's copies when it came (s)."""
-        for at, body in self._notified[-1:]:
-            for one in _read_notification(body):
-                if one.stamp is not None:
-                    return at - one.stamp
-        return float("inf")
 
     def times(self, begin: float, end: float) -> list[MessageTimes]:
         """Messages that were at the broker within a time (Unix s), in that order."""
         found: dict[MessageTimes, MessageTimes] = {}
-        for at, topic, payload in self._heard:
+        for at, topic, payload in self._published:
             if begin <= at < end:
                 read = codec.read_measure(topic.split("/")[2], payload)
-                for one in _messages_in(read):
-                    found.setdefault(one, replace(one, broker=at))
+                for message in _messages_in(read):
+                    found.setdefault(message, replace(message, broker=at))
         for at, body in self._notified:
-            for one in _read_notification(body):
-                known = found.get(one)
-                if known is not None and known.orion is None:
-                    found[one] = replace(known, orion=at)
+            with contextlib.suppress(UnreadableError):
+                for message in _messages_in(codec.read_notification(body)[1]):
+                    known = found.get(message)
+                    if known is not None and known.orion is None:
+                        found[message] = replace(known, orion=at)
         return list(found.values())
 
 
 def _messages_in(read: codec.ReadResult) -> Iterator[MessageTimes]:
     """The messages of a reading that count themselves; times are not known yet."""
-    for one in read.observations:
-        data, origin = data_of(kind_of(one)), one.origin
+    for observation in read.observations:
+        data, origin = data_of(kind_of(observation)), observation.origin
         if data is not None and origin.boot is not None and origin.seq is not None:
-            robot_id: str = one.robot_id
+            robot_id: str = observation.robot_id
             yield MessageTimes(robot_id, data, origin.boot, origin.seq, origin.stamp_s)
 
 
-def _read_notification(body: bytes) -> Iterator[MessageTimes]:
-    with contextlib.suppress(UnreadableError):
-        yield from _messages_in(codec.read_notification(body)[1])
-
-
-# --- where it listens -----------------------------------------------------------------
+# --- where it reads -------------------------------------------------------------------
 
 
 @contextlib.asynccontextmanager
@@ -199,21 +167,21 @@ async def recorder(settings: Settings) -> AsyncIterator[MessageRecorder]:
         HopError: the broker or Orion does not take it.
     """
     recorded = MessageRecorder()
-    orion, agent = open_fiware(settings)
-    host = urlsplit(settings.notify_address).hostname
+    tenant = settings.fiware_service, settings.fiware_servicepath
     async with (
-        _hearing(settings, recorded),
-        post_listener(recorded.notified, settings.host) as port,
-        orion,
-        agent,
+        _reading(settings, recorded),
+        post_listener(recorded.take_notification, _HOST) as port,
+        OrionClient(settings.orion_url, *tenant) as orion,
     ):
-        await _unsubscribe(orion)
-        for document in _subscriptions(f"http://{host}:{port}/"):
+        subscribed = [
             await orion.create_subscription(document)
+            for document in _subscriptions(f"http://{_HOST}:{port}/")
+        ]
         try:
             yield recorded
         finally:
-            await _unsubscribe(orion)
+            for subscription_id in subscribed:
+                await orion.delete_subscription(subscription_id)
 
 
 def _subscriptions(url: str) -> Iterator[dict[str, object]]:
@@ -228,15 +196,8 @@ def _subscriptions(url: str) -> Iterator[dict[str, object]]:
             }
 
 
-async def _unsubscribe(orion: OrionClient) -> None:
-    """Remove ours, and what a start that was killed left."""
-    for one in await orion.read_subscriptions():
-        if one.get("description") == DESCRIPTION:
-            await orion.delete_subscription(one["id"])
-
-
 @contextlib.asynccontextmanager
-async def _hearing(
+async def _reading(
     settings: Settings, recorded: MessageRecorder
 ) -> AsyncIterator[None]:
     """Read the agent's own topics at the broker, in a thread of its own.
@@ -250,12 +211,9 @@ async def _hearing(
         client.subscribe(topic)
 
     def arrived(_client: object, _data: object, message: paho.MQTTMessage) -> None:
-        recorded.heard(message.topic, bytes(message.payload))
+        recorded.take_publication(message.topic, bytes(message.payload))
 
     client = paho.Client(CallbackAPIVersion.VERSION2)
-    client.username_pw_set(address.user, address.password)
-    if address.tls:
-        client.tls_set_context(ssl.create_default_context())
     client.on_connect, client.on_message = connected, arrived
     client.on_subscribe = lambda *_: stands.set()
     try:

@@ -2,8 +2,8 @@
 
 Raw data has one file for each kind of row, one JSON object a line::
 
-    raw/together-1/run.json           scenario, seed, ends of both halves, STOPs
-    raw/together-1/truth.ndjson …     truth, told, encounters, decisions
+    raw/together-1/run.json           scenario, seed, ends of both halves
+    raw/together-1/truth.ndjson …     truth, reported, encounters, decisions
     raw/together-1/messages.ndjson    times of each message of the half in real time
     raw/demo-field-paper-1/…          a run for protection: the virtual half alone
 
@@ -33,7 +33,7 @@ from iveg.lab.experiment.protection import (
     protection_of,
     total_of,
 )
-from iveg.lab.experiment.scoring import score, tally, thinned
+from iveg.lab.experiment.scoring import score, tally
 from iveg.lab.experiment.stage import (
     TimedRecording,
     VirtualRecording,
@@ -95,8 +95,6 @@ AGAINST_ITS_TEXT: Final = (
     "iVeg tells as total was measured from end to end.",
     "Δt₂ in the field rests on 598 polls of Orion, Δt₁ on more than 10,000 messages a "
     "kind of data.",
-    "A detector with a mean confidence of 72 % is heard beneath the threshold of the "
-    "text's own rule (0.8) most of the time: see the shares that reached it.",
 )
 """Contradictions between the paper's tables and text (docs/experiment.md)."""
 
@@ -121,28 +119,23 @@ def timed_of(run: TimedRecording) -> Outcome:
         "completed": run.completed,
         "messages": counts_of(run.times),
         "hops_ms": hops_of(run.times),
-        "settled": run.settled,
-        "stops": run.stops,
     }
 
 
 def slowdowns_of(decisions: Sequence[Mapping[str, object]]) -> dict[str, int]:
     """Decisions that slowed a robot: number, applied, observed, out of sight."""
-    slowed = [one for one in decisions if one["reason"] in ("person", "robot")]
+    slowed = [row for row in decisions if row["reason"] in ("person", "robot")]
     return {
         "decided": len(slowed),
-        "applied": sum(one["applied_at"] is not None for one in slowed),
-        "observed": sum(one["observed_at"] is not None for one in slowed),
-        "out_of_sight": sum(one["in_sight"] is False for one in slowed),
+        "applied": sum(row["applied_at"] is not None for row in slowed),
+        "observed": sum(row["observed_at"] is not None for row in slowed),
+        "out_of_sight": sum(row["in_sight"] is False for row in slowed),
     }
 
 
-def outcome_of(
-    step: PlannedRun, counted: Outcome, timed: Outcome | None, load: Sequence[float]
-) -> Outcome:
-    """One run as stored; ``load`` of the machine before and after its last half."""
-    halves = {"counted": counted, "timed": timed}
-    return {**asdict(step), **halves, "load": [round(one, 1) for one in load]}
+def outcome_of(step: PlannedRun, counted: Outcome, timed: Outcome | None) -> Outcome:
+    """One run as stored."""
+    return {**asdict(step), "counted": counted, "timed": timed}
 
 
 def result_of(
@@ -152,8 +145,8 @@ def result_of(
     why: str = "",
 ) -> dict[str, object]:
     """The whole experiment; ``why`` is the reason of an early end, or empty."""
-    runs = [one for one in outcomes if one["timed"] is not None]
-    counted, timed = ([one[half] for one in runs] for half in ("counted", "timed"))
+    runs = [run for run in outcomes if run["timed"] is not None]
+    counted, timed = ([run[half] for run in runs] for half in ("counted", "timed"))
     return {
         "plan": asdict(plan),
         "ended_early": why,
@@ -167,12 +160,11 @@ def result_of(
         "configuration": dict(chosen),
         "planned": sum(step.is_timed for step in plan.steps()),
         "completed": {"counted": _completed(counted), "timed": _completed(timed)},
-        "detection": {name: scored([name], counted) for name in CLASSES},
-        "global": scored(CLASSES, counted),
-        "slowdowns": _sum(one["slowdowns"] for one in counted),
+        "detection": {name: _scored([name], counted) for name in CLASSES},
+        "global": _scored(CLASSES, counted),
+        "slowdowns": _sum(half["slowdowns"] for half in counted),
         "protected": _protected(plan, outcomes),
         "protection": [*_protection(outcomes)],
-        "stops": [stop for one in timed for stop in one["stops"]],
         "latency": [*_rows(timed)],
         "runs": list(outcomes),
     }
@@ -180,50 +172,38 @@ def result_of(
 
 def timed_runs(result: Json) -> list[Outcome]:
     """Its runs of the paper's scenarios, which have both halves."""
-    return [one for one in result["runs"] if one["timed"] is not None]
+    return [run for run in result["runs"] if run["timed"] is not None]
 
 
 def _completed(halves: Sequence[Outcome]) -> int:
-    return sum(one["completed"] for one in halves)
+    return sum(half["completed"] for half in halves)
 
 
 def _protected(plan: ExperimentPlan, outcomes: Sequence[Outcome]) -> Json | None:
     """All virtual runs with the experiment's own detector and the rule as it stands."""
     own = {"profile": plan.profile, "rule": "iveg"}
-    runs = [one["counted"] for one in outcomes if own.items() <= one.items()]
-    return total_of(one["protection"] for one in runs).row() if runs else None
+    runs = [run["counted"] for run in outcomes if own.items() <= run.items()]
+    return total_of(half["protection"] for half in runs).row() if runs else None
 
 
 def _protection(outcomes: Sequence[Outcome]) -> Iterator[dict[str, object]]:
     """Numbers of the scenarios, then of each profile and rule."""
     groups: dict[tuple[str, str, str], list[Protection]] = {}
-    for one in sorted(outcomes, key=lambda run: run["timed"] is None):
-        where = one["family"] if one["timed"] is None else "scenarios"
-        chosen = where, one["profile"], one["rule"]
-        groups.setdefault(chosen, []).append(one["counted"]["protection"])
+    for run in sorted(outcomes, key=lambda run: run["timed"] is None):
+        where = run["family"] if run["timed"] is None else "scenarios"
+        chosen = where, run["profile"], run["rule"]
+        groups.setdefault(chosen, []).append(run["counted"]["protection"])
     for (where, profile, rule), runs in groups.items():
         numbers = total_of(runs).row()
         yield {"where": where, "profile": profile, "rule": rule, **numbers}
 
 
-def scored(classes: Sequence[str], runs: Sequence[Outcome]) -> dict[str, object]:
-    """Counts, rates with their intervals and AP of some classes over all runs."""
-    tallies = [
-        one["classes"][name]
-        for one in runs
-        for name in classes
-        if name in one["classes"]
-    ]
-    total = score(tallies)
-    sure = [one for each in tallies for one in each.found]
-    precision = thinned(total.tp, total.tp + total.fp, total.claims)
-    recall = thinned(total.tp, total.tp + total.fn, total.looks)
-    return {
-        **asdict(total),
-        "confidence": fmean(sure) if sure else None,
-        "precision": None if precision is None else asdict(precision),
-        "recall": None if recall is None else asdict(recall),
-    }
+def _scored(classes: Sequence[str], runs: Sequence[Outcome]) -> dict[str, object]:
+    """Score of some classes over all runs."""
+    tallies = (run["classes"] for run in runs)
+    return asdict(
+        score(known[name] for known in tallies for name in classes if name in known)
+    )
 
 
 def _rows(timed: Sequence[Outcome]) -> Iterator[Json]:
@@ -231,10 +211,10 @@ def _rows(timed: Sequence[Outcome]) -> Iterator[Json]:
         yield {
             "data": data,
             "hops": {
-                hop: figures([ms for one in timed for ms in one["hops_ms"][data][hop]])
+                hop: figures([ms for run in timed for ms in run["hops_ms"][data][hop]])
                 for hop in HOPS
             },
-            "messages": _sum(one["messages"][data] for one in timed),
+            "messages": _sum(run["messages"][data] for run in timed),
         }
 
 
@@ -252,8 +232,8 @@ def figures(durations_ms: Sequence[float]) -> Json:
 
 def _sum(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
     total: Counter[str] = Counter()
-    for one in counts:
-        total.update(one)
+    for count in counts:
+        total.update(count)
     return dict(total)
 
 
@@ -265,25 +245,21 @@ def write_raw(
     outcome: Outcome,
     virtual: VirtualRecording,
     real: TimedRecording | None,
-    configuration: Mapping[str, object],
 ) -> None:
     """Write the raw data of one run into a directory of its own."""
     directory.mkdir(parents=True)
     _write_rows(directory / "truth.ndjson", virtual.truth)
-    _write_rows(directory / "told.ndjson", virtual.reported)
+    _write_rows(directory / "reported.ndjson", virtual.reported)
     _write_rows(directory / "encounters.ndjson", virtual.foretold)
     _write_rows(directory / "decisions.ndjson", virtual.decisions)
-    kept = ("family", "number", "seed", "profile", "rule", "load")
-    document: dict[str, object] = {one: outcome[one] for one in kept}
-    document["configuration"] = configuration
+    kept = ("family", "number", "seed", "profile", "rule")
+    document: dict[str, object] = {name: outcome[name] for name in kept}
     document["completed"] = {"virtual": virtual.completed}
     if real is not None:
         _write_rows(directory / "messages.ndjson", real.times)
         document |= {
             "completed": {"virtual": virtual.completed, "real": real.completed},
             "measured": {"began": real.began, "ended": real.ended},
-            "settled": real.settled,
-            "stops": real.stops,
         }
     write_json(directory / "run.json", document)
 

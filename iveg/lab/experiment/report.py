@@ -39,7 +39,6 @@ def write_report(result: Result) -> str:
         conclusions=list(conclusions(result)),
         runs=timed_runs(result),
         paper={**vars(outcome), "PAPER": PAPER},
-        confident=_confident(result),
         worst_p95=_worst_p95(result),
     )
 
@@ -72,16 +71,6 @@ def _yes(is_so: bool) -> str:
     return "yes" if is_so else "no"
 
 
-def _confident(result: Result) -> str:
-    """Share of the detections at or above the rule's threshold."""
-    threshold = result["configuration"].get("confidence_threshold")
-    tallies = (run["counted"]["classes"].values() for run in timed_runs(result))
-    found = [sure for run in tallies for tally in run for sure in tally.found]
-    if threshold is None or not found:
-        return "–"
-    return f"{sum(sure >= threshold for sure in found) / len(found):.0%} ({threshold})"
-
-
 def _worst_p95(result: Result) -> float | None:
     """Greatest P95 of a kind of data from robot to Orion (ms)."""
     hops = [row["hops"]["robot_orion"] for row in result["latency"]]
@@ -101,14 +90,13 @@ def conclusions(result: Result) -> Iterator[str]:
     if (farmer := result["detection"]["farmer"])["recall"] is not None:
         yield from _detection(farmer)
     yield from _latency(result)
-    yield from _stops(result["stops"])
 
 
 def _protection(protected: Json) -> str:
     met, never = protected["encounters"], protected["never_slowed"]
     if not met:
         return "Nobody in a camera's view came within 2 m of a moving robot."
-    shares = [_percent(protected["slowed"][one]) for one in ("in_view", "all")]
+    shares = [_percent(protected["slowed"][sight]) for sight in ("in_view", "all")]
     return (
         f"With a person in some camera's view within 2 m, robots drove at no more than "
         f"half speed for {shares[0]} of the time ({shares[1]} with everybody within "
@@ -126,7 +114,8 @@ def _completion(completed: int, runs: int) -> str:
 
 def _slow_downs(slowed: Mapping[str, int]) -> str:
     decided, applied, observed, unseen = (
-        slowed.get(one, 0) for one in ("decided", "applied", "observed", "out_of_sight")
+        slowed.get(name, 0)
+        for name in ("decided", "applied", "observed", "out_of_sight")
     )
     return (
         f"iVeg decided {decided} slow-downs: {applied} were applied by the robot's own "
@@ -139,7 +128,7 @@ def _detection(farmer: Json) -> Iterator[str]:
     if farmer["precision"] is None:
         return
     recall, precision = (
-        _percent(farmer[one]["share"]) for one in ("recall", "precision")
+        _percent(farmer[rate]["share"]) for rate in ("recall", "precision")
     )
     simulation, field = (PRINTED[place]["farmer"] for place in ("simulation", "field"))
     yield (
@@ -160,17 +149,4 @@ def _latency(result: Result) -> Iterator[str]:
         f"{_decimals(worst)} ms; the paper: {below[0]} in simulation, {below[1]} in "
         f"the field."
     )
-    if result["configuration"].get("fiware") == "embedded":
-        yield "All programs ran on one machine: no time is that of a radio link."
-
-
-def _stops(stops: list[Json]) -> Iterator[str]:
-    answers = [one["answer"]["direct"]["p50_ms"] for one in stops]
-    stood = [one["standing"]["p50_ms"] for one in stops]
-    if not stops or None in (*answers, *stood):
-        return
-    yield (
-        f"After STOP ALL each robot answered within {_decimals(max(answers))} ms and "
-        f"stood still within {_decimals(max(stood))} ms of the press (medians of each "
-        f"robot)."
-    )
+    yield "All programs ran on one machine: no time is that of a radio link."

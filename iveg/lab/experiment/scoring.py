@@ -12,6 +12,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from math import sqrt
+from statistics import fmean
 from typing import Final
 
 import numpy as np
@@ -55,12 +56,11 @@ _LOOK_S = 2.0
 
 @dataclass(frozen=True, slots=True)
 class SeenObject:
-    """A target in view, or a detection of one, by its centre in ``map`` (m).
+    """A target in view, or a detection of one, by its centre in ``base_link`` (m).
 
     Attributes:
         key: Id of a target; of a detection its index in the frame.
         confidence: Confidence of a detection (0 to 1).
-        local: Centre in ``base_link`` of its robot (m); None: known in ``map`` alone.
     """
 
     key: str
@@ -68,7 +68,6 @@ class SeenObject:
     x: float
     y: float
     confidence: float = 1.0
-    local: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,19 +85,21 @@ Pair = tuple[Picture, Picture]
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """Score of one class; ``ap`` is average precision at an overlap of one half.
+    """Score of one class, or of several together.
 
     Attributes:
-        looks: Looks at targets; ``claims``: looks with a reported detection.  Both
-            are effective sample sizes, as frames of one look are not independent.
+        precision: With its interval; ``recall`` likewise.
+        ap: Average precision at an overlap of one half.
+        confidence: Mean over the detections of targets.
     """
 
-    tp: int = 0
-    fp: int = 0
-    fn: int = 0
-    ap: float | None = None
-    looks: int = 0
-    claims: int = 0
+    tp: int
+    fp: int
+    fn: int
+    precision: Interval | None
+    recall: Interval | None
+    ap: float | None
+    confidence: float | None
 
 
 @dataclass(slots=True)
@@ -109,7 +110,8 @@ class Tally:
         found: Confidence of each reported detection of a target.
         missed: Number of frames with a target in view but not reported.
         ghosts: Confidence of each detection without a target.
-        looks, claims: As in ``Score``.
+        looks: Looks at targets; ``claims``: looks with a reported detection.  Both
+            are effective sample sizes, as frames of one look are not independent.
     """
 
     found: list[float] = field(default_factory=list)
@@ -164,31 +166,32 @@ def match(
 
 
 def overlap(real: SeenObject, reported: SeenObject) -> float:
-    """Intersection over union of two squares of the target's size at these centres.
-
-    They are compared in the robot's frame, where both are known in it.
-    """
+    """Intersection over union of two squares of the target's size at these centres."""
     size = SIZE_M.get(real.class_id, _ROBOT_SIZE_M)
-    a, b = (real.x, real.y), (reported.x, reported.y)
-    if real.local is not None and reported.local is not None:
-        a, b = real.local, reported.local
-    shared = max(0.0, size - abs(a[0] - b[0])) * max(0.0, size - abs(a[1] - b[1]))
+    along = max(0.0, size - abs(real.x - reported.x))
+    across = max(0.0, size - abs(real.y - reported.y))
+    shared = along * across
     return shared / (2 * size * size - shared)
 
 
 def score(tallies: Iterable[Tally]) -> Score:
-    """One class over all runs."""
-    runs = list(tallies)
-    found = [confidence for run in runs for confidence in run.found]
-    ghosts = [confidence for run in runs for confidence in run.ghosts]
-    missed = sum(run.missed for run in runs)
+    """Add up tallies, of one class over all runs or of several classes."""
+    total = Tally()
+    for tally_ in tallies:
+        total.found += tally_.found
+        total.ghosts += tally_.ghosts
+        total.missed += tally_.missed
+        total.looks += tally_.looks
+        total.claims += tally_.claims
+    tp, fp, fn = len(total.found), len(total.ghosts), total.missed
     return Score(
-        len(found),
-        len(ghosts),
-        missed,
-        average_precision(found, ghosts, len(found) + missed),
-        sum(run.looks for run in runs),
-        sum(run.claims for run in runs),
+        tp,
+        fp,
+        fn,
+        precision=thinned(tp, tp + fp, total.claims),
+        recall=thinned(tp, tp + fn, total.looks),
+        ap=average_precision(total.found, total.ghosts, tp + fn),
+        confidence=fmean(total.found) if total.found else None,
     )
 
 

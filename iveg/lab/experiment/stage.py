@@ -63,40 +63,35 @@ class TimedRecording:
     Attributes:
         began, ended: When it was measured (Unix s).
         times: Each message between them.
-        settled: Whether Orion kept up when it began.
         completed: Whether all robots were live at both ends.
-        stops: STOP of the fleet, robot by robot; empty unless it was the last run.
     """
 
     began: float
     ended: float
     times: Sequence[MessageTimes]
-    settled: bool
     completed: bool
-    stops: Sequence[Row] = ()
 
 
 def picture_of_truth(row: Row) -> Picture:
-    """One true picture, in ``map`` and in the robot's frame."""
+    """One true picture, in the robot's frame."""
     pose = Pose2D(**row["pose"])
     seen = []
     for target in row["visible"]:
-        place = target["x"], target["y"]
-        local = pose.inverse(*place)
-        seen.append(SeenObject(target["key"], target["class"], *place, local=local))
+        x, y = pose.inverse(target["x"], target["y"])
+        seen.append(SeenObject(target["key"], target["class"], x, y))
     return Picture(row["robot"], row["at"], tuple(seen))
 
 
 def picture_of(frame: Row, at: float) -> Picture:
-    """One detection frame as iVeg told it, taken at this time (s)."""
+    """One detection frame as iVeg shows it, taken at this time (s).
+
+    Emulated detectors give every box in ``base_link``.
+    """
     seen = []
     for number, item in enumerate(frame["items"]):
-        box, centre = item["box"], None
-        if box is not None and box["frame_id"] == "base_link":
-            centre = (box["xmin"] + box["xmax"]) / 2, (box["ymin"] + box["ymax"]) / 2
-        place = item["position"]["x"], item["position"]["y"]
-        sure = item["probability"]
-        seen.append(SeenObject(str(number), item["class_id"], *place, sure, centre))
+        box, confidence = item["box"], item["probability"]
+        x, y = (box["xmin"] + box["xmax"]) / 2, (box["ymin"] + box["ymax"]) / 2
+        seen.append(SeenObject(str(number), item["class_id"], x, y, confidence))
     return Picture(frame["robot_id"], at, tuple(seen))
 
 

@@ -73,7 +73,8 @@ def test_counts_are_worth_as_many_looks_of_two_seconds_as_they_are_of() -> None:
     found = scored(pictures(8, person()), pictures(8, person(), person(9.0)))
 
     assert (found.tp, found.fp) == (80, 80)
-    assert (found.looks, found.claims) == (4, 8)
+    assert found.recall == wilson(4, 4)
+    assert found.precision == wilson(4, 8)
 
 
 def test_each_target_takes_its_own_detection_the_surest_first() -> None:
