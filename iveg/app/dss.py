@@ -17,7 +17,7 @@ from pathlib import Path
 from fastapi import FastAPI
 
 from iveg import __version__
-from iveg.adapters import clock, log_filter
+from iveg.adapters import clock
 from iveg.adapters.calibration_files import load_calibrations
 from iveg.adapters.clock import new_id
 from iveg.adapters.direct import DirectReader
@@ -267,7 +267,6 @@ class Dss:
         total = self.pipeline.counters()
         for counted in (
             self.stores.recorder.counters,
-            log_filter.counted,
             self.messenger.counters,
             self.upkeep.counters,
             self.stores.inputs.counters,
