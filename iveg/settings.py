@@ -104,7 +104,7 @@ class Settings:
         "IVEG_MQTT_CERT",
         "",
         "File of the own certificate, by which the broker knows who comes. It and its "
-        "key are read at each connection, and a new one connects anew.",
+        "key are read at each connection.",
     )
     mqtt_key: str = setting("IVEG_MQTT_KEY", "", "File of the key of `IVEG_MQTT_CERT`.")
     orion_url: Url = setting(

@@ -1,14 +1,12 @@
 """JSON over HTTP from a server that somebody has configured, and that may be hostile.
 
-Time, size and threads are bounded; redirects are followed nowhere, and a body comes as
+Time and size are bounded; redirects are followed nowhere, and a body comes as
 it is, so that no small one unpacks into a large one.
 """
 
 import asyncio
-import socket
 import ssl
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from typing import Final
@@ -21,7 +19,6 @@ from iveg.domain.records import Json
 
 TIMEOUT_S: Final = 5.0
 MOST_BYTES: Final = 256 * 1024
-_THREADS: Final = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,17 +51,15 @@ class BoundedJson:
 
     def __init__(self, hop: str, timeout_s: float = TIMEOUT_S) -> None:
         self._hop, self._timeout_s = hop, timeout_s
-        self._names = ThreadPoolExecutor(_THREADS, "names")
         self._client = httpx.AsyncClient(
-            transport=_OwnNames(self._names),
+            transport=httpx.AsyncHTTPTransport(verify=_believed()),
             timeout=timeout_s,
             headers={"Accept": "application/json", "Accept-Encoding": "identity"},
         )
 
     async def close(self) -> None:
-        """Close connections and threads."""
+        """Close connections."""
         await self._client.aclose()
-        self._names.shutdown(wait=False, cancel_futures=True)
 
     async def get(
         self,
@@ -130,33 +125,3 @@ class BoundedJson:
 def _believed() -> ssl.SSLContext:
     """Certificates of this machine; reading them takes a while."""
     return ssl.create_default_context()
-
-
-class _OwnNames(httpx.AsyncBaseTransport):
-    """Connections whose names are resolved in threads of their own.
-
-    A name server that hangs would otherwise take the threads of everything else.
-    """
-
-    def __init__(self, names: ThreadPoolExecutor) -> None:
-        self._names = names
-        self._inner = httpx.AsyncHTTPTransport(verify=_believed())
-
-    async def handle_async_request(self, request: httpx.Request) -> httpx.Response:
-        host = request.url.host
-        port = request.url.port or (443 if request.url.scheme == "https" else 80)
-        loop = asyncio.get_running_loop()
-        address = await loop.run_in_executor(self._names, _look_up, host, port)
-        # The certificate is checked against the name, and Host keeps it.
-        request.extensions["sni_hostname"] = host
-        request.url = request.url.copy_with(host=address)
-        return await self._inner.handle_async_request(request)
-
-    async def aclose(self) -> None:
-        await self._inner.aclose()
-
-
-def _look_up(host: str, port: int) -> str:
-    found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
-    # An address of a link is written with its interface: fe80::1%eth0.
-    return str(found[0][4][0]).partition("%")[0]

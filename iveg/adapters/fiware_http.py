@@ -7,7 +7,8 @@ A PEP proxy before them may ask for a token.  One for both is got at a token end
       ^             └──refused (401), or over──> asked for, and waited for
       └── not given: requests fail with that cause, and never leave without a bearer
 
-Asked for by one request at a time, whoever waits; after a failure not before a pause.
+It is asked for once, however many requests wait, and after a failure not before a
+pause.
 """
 
 import asyncio
@@ -18,22 +19,22 @@ from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from http import HTTPStatus
-from typing import Any, ClassVar, Final, Literal, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Final, Literal, Self, TypeVar
 
 import httpx
-import orjson
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
 from iveg.adapters.bounded_json import BoundedJson
 from iveg.domain.errors import HopError, NoAnswerError
+from iveg.domain.wire import OR_NONE
 
 HOP: Final = "token"
-PART_OF_LIFE: Final = 0.8
-FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 3.0
-"""As between questions to Orion."""
+_PART_OF_LIFE: Final = 0.8
+_PAUSE_S: Final = 2.0
+"""Between a failure and the next question for a token."""
 _REFUSED_S: Final = 5.0
-_UNTOLD_S, _MOST_S, _MOST_CHARACTERS = 300.0, 86400.0, 16 * 1024
-"""A life that is not told (s), and the longest that is believed (s)."""
+_UNTOLD_S: Final = 300.0
+"""Life of a token that does not say how long it lasts."""
 _log = logging.getLogger(__name__)
 
 TokenHeader = Literal["Authorization", "X-Auth-Token"]
@@ -73,18 +74,13 @@ class TokenGrant:
         return asked | ({"scope": self.scope} if self.scope else {})
 
 
-@dataclass(frozen=True, slots=True)
-class HeldToken:
-    """A token.
+class _Answer(BaseModel):
+    """A token as an endpoint gives it; what cannot stand in a header is none."""
 
-    Attributes:
-        renew_at: When another is asked for beside (s, monotonic).
-        ends_at: When it is over (s, monotonic).
-    """
-
-    text: str = field(repr=False)
-    renew_at: float
-    ends_at: float
+    access_token: Annotated[str, Field(pattern=r"^[\x21-\x7e]{1,16384}$")]
+    expires_in: Annotated[Annotated[float, Field(gt=0, le=86400)] | None, OR_NONE] = (
+        None
+    )
 
 
 class FiwareToken(httpx.Auth):
@@ -100,11 +96,14 @@ class FiwareToken(httpx.Auth):
         self, grant: TokenGrant, mono: Callable[[], float], http: BoundedJson
     ) -> None:
         self._grant, self._mono, self._http = grant, mono, http
-        self._held: HeldToken | None = None
+        self._drop()
         self._asking: asyncio.Task[None] | None = None
         self._error = ""
-        self._pause_s, self._again_at = FIRST_PAUSE_S, float("-inf")
-        self._refused_at = float("-inf")
+        self._again_at = self._refused_at = float("-inf")
+
+    def _drop(self) -> None:
+        self._text = ""
+        self._renew_at = self._ends_at = float("-inf")
 
     async def async_auth_flow(
         self, request: httpx.Request
@@ -117,9 +116,8 @@ class FiwareToken(httpx.Auth):
         patience_s = _TOKEN_PART * request.extensions["timeout"]["read"]
         token = await self._in_time(patience_s)
         response = yield self._carrying(request, token)
-        # Wilma says 401 also to whom it knows and gives no role: asking on for another
-        # token would help nobody.
-        if response.status_code == HTTPStatus.UNAUTHORIZED and self._drops(token):
+        is_refused = response.status_code == HTTPStatus.UNAUTHORIZED
+        if is_refused and self._may_be_replaced(token):
             yield self._carrying(request, await self._in_time(patience_s))
 
     async def _in_time(self, patience_s: float) -> str:
@@ -137,21 +135,29 @@ class FiwareToken(httpx.Auth):
 
     async def _current(self) -> str:
         """A token that is not over. Raises HopError: there is none."""
-        held, now = self._held, self._mono()
-        if held is None or now >= held.ends_at:
-            return await self._asked()
-        if now >= held.renew_at and now >= self._again_at:
+        now = self._mono()
+        is_asking = self._asking is not None and not self._asking.done()
+        if now >= max(self._renew_at, self._again_at) and not is_asking:
             # Beside: while the old one lasts, nobody waits for the new one.
-            self._ask()
-        return held.text
+            self._asking = asyncio.create_task(self._renew(), name="fiware-token")
+        if now >= self._ends_at and self._asking is not None:
+            # Who gives up takes the answer from nobody else.
+            await asyncio.shield(self._asking)
+            if self._error:
+                raise HopError(HOP, self._error)
+        return self._text
 
-    def _drops(self, refused: str) -> bool:
-        """Whether there may be another token than a refused one."""
-        if self._held is not None and self._held.text == refused:
+    def _may_be_replaced(self, refused: str) -> bool:
+        """Whether another token may do better than a refused one.
+
+        Wilma says 401 also to whom it knows and gives no role: then none does.
+        """
+        if self._text == refused:
             now = self._mono()
             if now - self._refused_at < _REFUSED_S:
                 return False
-            self._held, self._refused_at = None, now
+            self._refused_at = now
+            self._drop()
         return True
 
     async def close(self) -> None:
@@ -161,66 +167,30 @@ class FiwareToken(httpx.Auth):
             await asyncio.gather(self._asking, return_exceptions=True)
         await self._http.close()
 
-    async def _asked(self) -> str:
-        if self._mono() >= self._again_at or self._is_asking:
-            # Who gives up takes the answer from nobody else.
-            await asyncio.shield(self._ask())
-        if self._held is None or self._error:
-            raise HopError(HOP, self._error)
-        return self._held.text
-
-    @property
-    def _is_asking(self) -> bool:
-        return self._asking is not None and not self._asking.done()
-
-    def _ask(self) -> asyncio.Task[None]:
-        if self._asking is None or self._asking.done():
-            self._asking = asyncio.create_task(self._renew(), name="fiware-token")
-        return self._asking
-
     async def _renew(self) -> None:
+        began = self._mono()
         try:
-            self._held = await self._fetch()
+            answer = await self._fetch()
         except HopError as error:
             if not self._error:
                 _log.warning("no bearer for Orion and the agent: %s", error)
-            self._error, self._again_at = error.detail, self._mono() + self._pause_s
-            self._pause_s = min(LONGEST_PAUSE_S, 2 * self._pause_s)
-        else:
-            self._error = ""
-            self._pause_s, self._again_at = FIRST_PAUSE_S, float("-inf")
+            self._error, self._again_at = error.detail, self._mono() + _PAUSE_S
+            return
+        life_s = answer.expires_in or _UNTOLD_S
+        self._text, self._error = answer.access_token, ""
+        self._renew_at, self._ends_at = began + _PART_OF_LIFE * life_s, began + life_s
 
-    async def _fetch(self) -> HeldToken:
-        grant, began = self._grant, self._mono()
-        answer = await self._http.post(
-            grant.url, grant.form, (grant.client_id, grant.secret)
-        )
+    async def _fetch(self) -> _Answer:
+        grant = self._grant
+        login = grant.client_id, grant.secret
+        answer = await self._http.post(grant.url, grant.form, login)
         if not answer.is_success:
             raise HopError(HOP, answer.refusal)
-        text = answer.body.get("access_token")
-        if not isinstance(text, str) or not _is_token(text):
-            raise HopError(HOP, "answered no token")
-        life_s = _life_of(answer.body.get("expires_in"))
-        return HeldToken(text, began + PART_OF_LIFE * life_s, began + life_s)
-
-
-def _is_token(text: str) -> bool:
-    """Whether a text may stand in a header."""
-    return (
-        0 < len(text) <= _MOST_CHARACTERS
-        and text.isascii()
-        and text.isprintable()
-        and " " not in text
-    )
-
-
-def _life_of(told: object) -> float:
-    """Life of a token (s), as far as it can be believed."""
-    try:
-        life = float(told) if isinstance(told, int | float | str) else 0.0
-    except ValueError:
-        life = 0.0
-    return min(life, _MOST_S) if life > 0 and told is not True else _UNTOLD_S
+        try:
+            return _Answer.model_validate(answer.body)
+        except ValidationError:
+            # Of the error nothing: it shows what was given.
+            raise HopError(HOP, "answered no token") from None
 
 
 _NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
@@ -240,11 +210,11 @@ NO_TOKEN = "token endpoint down"  # noqa: S105 - a cause
 _TOKEN_PART = 0.9
 
 Document = dict[str, Any]
-_T = TypeVar("_T")
+_T, _V = TypeVar("_T"), TypeVar("_V")
 _OBJECT: TypeAdapter[Document] = TypeAdapter(Document)
 _OBJECTS: TypeAdapter[list[Document]] = TypeAdapter(list[Document])
 _NUMBER = TypeAdapter(int)
-MEANINGLESS = "answered JSON that means nothing here"
+MEANINGLESS = "answered something that means nothing here"
 
 
 @cache
@@ -357,22 +327,15 @@ class FiwareHttp:
 
     def read_object(self, response: httpx.Response) -> Document:
         """The object that is an answer. Raises HopError: it is anything else."""
-        return self._as(_OBJECT, self._json(response))
+        return self._valid(_OBJECT.validate_json, response.content)
 
-    def read_list(self, response: httpx.Response, part: str = "") -> list[Document]:
-        """The list of objects in an answer, or in one part of it. Raises HopError."""
-        found = self.read_object(response).get(part) if part else self._json(response)
-        return self._as(_OBJECTS, found)
+    def read_list(self, response: httpx.Response) -> list[Document]:
+        """The list of objects that is an answer. Raises HopError."""
+        return self._valid(_OBJECTS.validate_json, response.content)
 
-    def _json(self, response: httpx.Response) -> object:
+    def _valid(self, validate: Callable[[_V], _T], value: _V) -> _T:
         try:
-            return orjson.loads(response.content)
-        except ValueError as error:
-            raise HopError(self.HOP, "answered something that is not JSON") from error
-
-    def _as(self, shape: TypeAdapter[_T], document: object) -> _T:
-        try:
-            return shape.validate_python(document)
+            return validate(value)
         except ValidationError as error:
             raise HopError(self.HOP, MEANINGLESS) from error
 
@@ -393,11 +356,15 @@ class FiwareHttp:
         for _ in range(_MOST_PAGES):
             page = {**query, "limit": str(PAGE_SIZE), "offset": str(len(found))}
             response = await self.ask("GET", path, query=page)
-            rows = self.read_list(response, part)
+            if part:
+                answer = self.read_object(response)
+                rows = self._valid(_OBJECTS.validate_python, answer.get(part))
+                total = answer.get("count", 0)
+            else:
+                rows = self.read_list(response)
+                total = response.headers.get("Fiware-Total-Count", 0)
             found += rows
-            about = self.read_object(response) if part else response.headers
-            total = about.get("count" if part else "Fiware-Total-Count", 0)
-            if not rows or len(found) >= self._as(_NUMBER, total):
+            if not rows or len(found) >= self._valid(_NUMBER.validate_python, total):
                 break
         return found
 

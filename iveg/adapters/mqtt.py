@@ -16,20 +16,17 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
-from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import aiomqtt
 
-from iveg.adapters.log_filter import quiet
 from iveg.domain.errors import HopError
 
 # --- certificates -----------------------------------------------------------------
 #
 # TLS to the broker: whom to trust, and the certificate by which a program is known.
 #
-# The files are read at each connection, so that a certificate is renewed by replacing
-# its files; ``MqttLink`` connects anew when they change.
+# The files are read at each connection.
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,25 +53,8 @@ class TlsFiles:
             context.load_cert_chain(self.certificate, self.key or None)
         return context
 
-    def state(self) -> "FileState":
-        """Changes when a file is replaced: its time and inode; None: not there."""
-        return tuple(map(_state, filter(None, self._files())))
-
-    def _files(self) -> tuple[str, ...]:
-        return self.authority, self.certificate, self.key
-
 
 NO_FILES = TlsFiles()
-FileState = tuple[tuple[int, int] | None, ...]
-
-
-def _state(file: str) -> tuple[int, int] | None:
-    try:
-        found = Path(file).stat()
-    except OSError:
-        return None
-    return found.st_mtime_ns, found.st_ino
-
 
 # --- the address ------------------------------------------------------------------
 #
@@ -120,8 +100,8 @@ class BrokerAddress:
 # --- the connection ---------------------------------------------------------------
 
 _log = logging.getLogger(__name__)
-# aiomqtt's own: it complains of every message that finds no room or no confirmation.
-quiet("mqtt")
+# aiomqtt's own: it complains of every message that waits for its confirmation.
+logging.getLogger("mqtt").setLevel(logging.ERROR)
 NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
 MOST_EARLY = 2000
 """Messages at QoS 1 that wait until all subscriptions stand; the oldest give way."""
@@ -138,7 +118,6 @@ class MqttLink:
         name: Says in logs whose connection this is; ids stay random.
         subscriptions: Topic filter → QoS, asked for on every connect.
         on_message: Called in the loop with topic and payload; must not block.
-        look_every_s: Between two looks for another certificate (s).
     """
 
     def __init__(
@@ -147,11 +126,9 @@ class MqttLink:
         name: str,
         subscriptions: Mapping[str, int] | None = None,
         on_message: Callable[[str, bytes], None] = lambda _topic, _payload: None,
-        look_every_s: float = 2.0,
     ) -> None:
         self._address = address
         self._name = name
-        self._look_every_s = look_every_s
         self.attach(subscriptions or {}, on_message)
         self._client: aiomqtt.Client | None = None
         self._offered: dict[str, tuple[bytes, int]] = {}
@@ -216,11 +193,6 @@ class MqttLink:
                 if not self._loss_told:
                     _log.warning("%s: broker lost: %s", self._name, error)
                     self._loss_told = True
-            else:
-                # Its certificate is another: nobody has to wait for a broker.
-                self._client = None
-                self._on_loss()
-                continue
             if self._client is not None:
                 self._client = None
                 pause = _FIRST_PAUSE_S
@@ -229,7 +201,7 @@ class MqttLink:
             pause = min(_LONGEST_PAUSE_S, 2 * pause)
 
     async def _session(self) -> None:
-        files = self._address.files.state()
+        """Connect and serve; ends by an error, or by being cancelled."""
         ends = list[asyncio.Future[None]]()
         try:
             async with AsyncExitStack() as connections:
@@ -240,18 +212,15 @@ class MqttLink:
                     for topic_filter, qos in subscriptions.items():
                         await client.subscribe(topic_filter, qos=qos)
                 _heed_cancellation()
-                await self._serve(client, ends, files)
+                await self._serve(client, ends)
         finally:
             # Each hears of its own end, or asyncio complains of an error nobody took.
             await asyncio.gather(*ends, return_exceptions=True)
 
     async def _serve(
-        self,
-        client: aiomqtt.Client,
-        ends: Sequence[asyncio.Future[None]],
-        files: FileState,
+        self, client: aiomqtt.Client, ends: Sequence[asyncio.Future[None]]
     ) -> None:
-        """Hand on and send, until a connection is lost or has to be made anew."""
+        """Hand on and send, until a connection is lost."""
         self._client = client
         self._loss_told = False
         self.connects += 1
@@ -263,7 +232,8 @@ class MqttLink:
         try:
             while self._early:
                 self._hand_over(self._early.popleft())
-            await self._until_over(ends, files)
+            done, _ = await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+            done.pop().result()
         finally:
             sender.cancel()
 
@@ -282,33 +252,6 @@ class MqttLink:
             # A STOP never waits until the broker has confirmed telemetry.
             max_inflight_messages=0,
         )
-
-    async def _until_over(
-        self, ends: Sequence[asyncio.Future[None]], files: FileState
-    ) -> None:
-        """Until a connection is lost (MqttError), or its certificate is another."""
-        while True:
-            done, _ = await asyncio.wait(
-                ends,
-                timeout=self._look_every_s,
-                return_when=asyncio.FIRST_COMPLETED,
-            )
-            for end in done:
-                return end.result()
-            now = self._address.files.state()
-            if now != files and self._can_connect():
-                _log.info("%s: a new certificate: connecting anew", self._name)
-                return None
-            files = now
-
-    def _can_connect(self) -> bool:
-        """Whether the files fit together: half-written ones end no connection."""
-        try:
-            self._address.context()
-        except OSError as error:
-            _log.warning("%s: certificate not used: %s", self._name, error)
-            return False
-        return True
 
     def _take(self, message: aiomqtt.Message) -> None:
         """Hand on what was read, or keep it until all subscriptions stand."""

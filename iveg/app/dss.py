@@ -17,7 +17,7 @@ from pathlib import Path
 from fastapi import FastAPI
 
 from iveg import __version__
-from iveg.adapters import clock, log_filter
+from iveg.adapters import clock
 from iveg.adapters.calibration_files import load_calibrations
 from iveg.adapters.clock import new_id
 from iveg.adapters.direct import DirectReader
@@ -25,7 +25,7 @@ from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.loop_watch import LoopWatch
+from iveg.adapters.loop_watch import watch_loop
 from iveg.adapters.messages import AppriseSender, load_messages
 from iveg.adapters.provisioner import FiwareSite, Provisioner
 from iveg.adapters.recordings.pictures import PictureFiles
@@ -267,7 +267,6 @@ class Dss:
         total = self.pipeline.counters()
         for counted in (
             self.stores.recorder.counters,
-            log_filter.counted,
             self.messenger.counters,
             self.upkeep.counters,
             self.stores.inputs.counters,
@@ -276,7 +275,7 @@ class Dss:
         return total
 
     def queues(self) -> health.Queues:
-        """Depth of each queue, messages dropped from it, and repeated attempts."""
+        """Depth of each queue, and messages dropped from it."""
         ingest, kept = self.pipeline.ingest, self.stores.recorder.counters
         link = self.outside.link
         dropped = {
@@ -286,18 +285,12 @@ class Dss:
             "history": kept["history_dropped"],
             "mqtt_out": link.replaced,
         }
-        machines = self.pipeline.commander.machines.values()
-        stops = [machine.stop for machine in machines if machine.stop is not None]
-        retries = {
-            "broker_connect": max(0, link.connects - 1),
-            "stop_send": sum(max(0, one.tries - 1) for one in stops),
-        }
         depths = {
             "ingest": ingest.waiting,
             "history": kept["history_waiting"],
             "mqtt_out": link.offered,
         }
-        return health.Queues(depths, dropped, retries)
+        return health.Queues(depths, dropped)
 
     # --- life ---------------------------------------------------------------------
 
@@ -345,7 +338,7 @@ class Dss:
             MESSAGES: self.messenger.run,
             ACCOUNTS: self.accounts.run,
             "earlier": self._remember,
-            "loop-watch": LoopWatch(self.supervision.note_turn).run,
+            "loop-watch": partial(watch_loop, self.supervision.note_turn),
         }
 
     async def _take_pictures(self) -> None:

@@ -79,7 +79,7 @@ class Supervision:
         first_pause_s: Before the first restart of a part.
 
     Attributes:
-        counters: Failures and long turns since the start, by part.
+        counters: Failures by part, and long turns, since the start.
     """
 
     def __init__(
@@ -94,11 +94,8 @@ class Supervision:
         self._failed_at: dict[str, float] = {}
         self._stopped: set[str] = set()
         """Parts that wait for their restart."""
-        self._minute = 0
-        self._longest_s = 0.0, 0.0
-        """Longest turn of this minute, and of the one before (s)."""
-        self._long_turns: dict[str, tuple[float, float]] = {}
-        """Part → when its newest long turn ended (monotonic, s), and its CPU (s)."""
+        self._long_turn = float("-inf"), 0.0
+        """When the newest long turn ended (monotonic, s), and its CPU (s)."""
         self._found: dict[str, tuple[Condition, ...]] = {}
 
     def listen(self, part: str, **calls: Unpack[Listeners]) -> None:
@@ -149,29 +146,14 @@ class Supervision:
         """Take the conditions of a part in the place of its earlier ones."""
         self._found[part] = tuple(wrong)
 
-    def note_turn(self, part: str, cpu_s: float) -> None:
+    def note_turn(self, cpu_s: float) -> None:
         """One turn of the loop is over, which took so much CPU (s)."""
-        now = self._clock()
-        self._pass_minutes(now)
-        this, before = self._longest_s
-        self._longest_s = max(this, cpu_s), before
         if cpu_s > LONGEST_TURN_S:
-            self.counters[f"long_turn.{part}"] += 1
-            self._long_turns[part] = now.mono, cpu_s
-
-    def longest_turn_s(self, now: Instant) -> float:
-        """CPU of the longest turn of this minute and of the one before (s)."""
-        self._pass_minutes(now)
-        return max(self._longest_s)
-
-    def _pass_minutes(self, now: Instant) -> None:
-        minute = int(now.mono // 60.0)
-        for _ in range(min(2, minute - self._minute)):
-            self._longest_s = 0.0, self._longest_s[0]
-        self._minute = minute
+            self.counters["long_turn"] += 1
+            self._long_turn = self._clock().mono, cpu_s
 
     def conditions(self, now: Instant) -> Iterable[Condition]:
-        """A P3 for each part that is down, a P2 for each that held up the loop.
+        """A P3 for each part that is down, a P2 while the loop was held up.
 
         Beside them, what parts have reported.
         """
@@ -179,10 +161,10 @@ class Supervision:
         for part in self._failed_at:
             if self._is_down(part, now):
                 yield Condition("P3", "alert.part_down", part, None, {"part": part})
-        for part, (at, cpu_s) in self._long_turns.items():
-            if now.mono - at < SHOWN_S:
-                slots: dict[str, Slot] = {"part": part, "ms": round(1000.0 * cpu_s)}
-                yield Condition("P2", "alert.loop_held_up", part, None, slots)
+        ended_at, cpu_s = self._long_turn
+        if now.mono - ended_at < SHOWN_S:
+            slots: dict[str, Slot] = {"ms": round(1000.0 * cpu_s)}
+            yield Condition("P2", "alert.loop_held_up", "loop", None, slots)
 
     def _is_down(self, part: str, now: Instant) -> bool:
         """Whether it waits for its restart, or failed so recently that it may again."""

@@ -113,9 +113,8 @@ def live_routers(web: WebParts) -> Iterator[Callable[[], APIRouter]]:
     yield partial(detections.words_router, parts.detectors, parts.things, clock)
     yield partial(latency.router, watch, clock, web.worker)
     yield partial(past.router, web.recordings, web.past, clock)
-    turns = parts.core.supervision.longest_turn_s
-    asked = web.accounts, watch, web.queues, turns
-    yield partial(health.router, clock, views.health, *asked)
+    beside = web.accounts, watch, web.queues
+    yield partial(health.router, clock, views.health, *beside)
 
 
 def build_app(

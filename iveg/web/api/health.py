@@ -27,20 +27,18 @@ _Latency = list[tuple[tuple[str, str, str], int, float, list[Sketch]]]
 
 @dataclass(frozen=True, slots=True)
 class Queues:
-    """Depth of queues, drops and retries.
+    """Depth of queues, and drops.
 
     Attributes:
         depths: Queue → number of waiting items.
         dropped: Queue → items dropped since the start.
-        retries: Operation → retries since the start.
     """
 
     depths: Mapping[str, int]
     dropped: Mapping[str, int]
-    retries: Mapping[str, int]
 
 
-class _Told(Collector):
+class _Computed(Collector):
     """Families that were computed for one request."""
 
     def __init__(self, families: list[Metric]) -> None:
@@ -52,15 +50,11 @@ class _Told(Collector):
 
 
 def _family(
-    kind: str,
-    name: str,
-    text: str,
-    samples: Mapping[str, float | None],
-    label: str = "",
+    type_: str, name: str, text: str, label: str, samples: Mapping[str, float | None]
 ) -> Metric:
     """One family; samples that nobody knows are left out."""
-    made = Metric(f"iveg_{name}", text, kind)
-    sample = f"iveg_{name}_total" if kind == "counter" else f"iveg_{name}"
+    made = Metric(f"iveg_{name}", text, type_)
+    sample = f"iveg_{name}_total" if type_ == "counter" else f"iveg_{name}"
     for key, value in samples.items():
         if value is not None:
             made.add_sample(sample, {label: key} if label else {}, value)
@@ -68,82 +62,73 @@ def _family(
 
 
 def _families(health: Health, watch: LatencyWatch, queues: Queues) -> list[Metric]:
+    hops, clocks = health.hops, watch.clocks
     latency, asked = health.safety.alert_latency, health.safety.not_echoed
     shares = {"0.5": latency.p50_ms, "0.95": latency.p95_ms, "0.99": latency.p99_ms}
+    within = "last five minutes."
     return [
-        _family(
-            "counter",
-            "events",
-            "Events since the start, by name.",
-            health.counters,
-            "name",
-        ),
-        _family(
-            "gauge",
-            "hop_up",
-            "1 while the hop works, else 0.",
-            {one.hop: one.state == "ok" for one in health.hops},
-            "hop",
-        ),
-        _family(
-            "gauge",
-            "lag_seconds",
-            "Lag of the heartbeat probe at the hop.",
-            {one.hop: one.lag_s for one in health.hops},
-            "hop",
-        ),
-        _family(
-            "gauge",
-            "lag_growing",
-            "1 while that lag grows, else 0.",
-            {one.hop: one.growing for one in health.hops if one.lag_s is not None},
-            "hop",
-        ),
-        _family(
-            "gauge",
-            "clock_offset_seconds",
-            "Clock of the robot minus clock of the server.",
-            {robot: one.offset_s for robot, one in watch.clocks.items()},
-            "robot",
-        ),
-        _family(
-            "gauge",
-            "clock_uncertainty_seconds",
-            "Greatest error of that offset.",
-            {robot: one.uncertainty_s for robot, one in watch.clocks.items()},
-            "robot",
-        ),
-        _family("gauge", "queue_depth", "Items in the queue.", queues.depths, "queue"),
-        _family(
-            "counter",
-            "dropped",
-            "Items that a full queue dropped.",
-            queues.dropped,
-            "queue",
-        ),
-        _family("counter", "retries", "Repeated operations.", queues.retries, "what"),
-        _family(
-            "gauge",
-            "alert_latency_seconds",
-            "From a detection of a person to the robot's report, last five minutes.",
-            {
-                share: None if ms is None else ms / 1000.0
-                for share, ms in shares.items()
-            },
-            "quantile",
-        ),
-        _family(
-            "gauge",
-            "alerts_not_echoed",
-            "Alerts without an answer within one second, last five minutes.",
-            {"": asked.count},
-        ),
-        _family(
-            "gauge",
-            "alerts_asked",
-            "Alerts that required an answer, last five minutes.",
-            {"": asked.of},
-        ),
+        _family(*row)
+        for row in (
+            ("counter", "events", "Events since the start.", "name", health.counters),
+            (
+                "gauge",
+                "hop_up",
+                "1 while the hop works, else 0.",
+                "hop",
+                {one.hop: one.state == "ok" for one in hops},
+            ),
+            (
+                "gauge",
+                "lag_seconds",
+                "Lag of the heartbeat probe at the hop.",
+                "hop",
+                {one.hop: one.lag_s for one in hops},
+            ),
+            (
+                "gauge",
+                "lag_growing",
+                "1 while that lag grows, else 0.",
+                "hop",
+                {one.hop: one.growing for one in hops if one.lag_s is not None},
+            ),
+            (
+                "gauge",
+                "clock_offset_seconds",
+                "Clock of the robot minus clock of the server.",
+                "robot",
+                {robot: one.offset_s for robot, one in clocks.items()},
+            ),
+            (
+                "gauge",
+                "clock_uncertainty_seconds",
+                "Greatest error of that offset.",
+                "robot",
+                {robot: one.uncertainty_s for robot, one in clocks.items()},
+            ),
+            ("gauge", "queue_depth", "Items in the queue.", "queue", queues.depths),
+            ("counter", "dropped", "Items dropped.", "queue", queues.dropped),
+            (
+                "gauge",
+                "alert_latency_seconds",
+                f"From a detection of a person to the robot's report, {within}",
+                "quantile",
+                {name: ms and ms / 1000.0 for name, ms in shares.items()},
+            ),
+            (
+                "gauge",
+                "alerts_not_echoed",
+                f"Alerts without an answer within one second, {within}",
+                "",
+                {"": asked.count},
+            ),
+            (
+                "gauge",
+                "alerts_asked",
+                f"Alerts that required an answer, {within}",
+                "",
+                {"": asked.of},
+            ),
+        )
     ]
 
 
@@ -172,7 +157,6 @@ def router(
     accounts: Callable[[], str],
     watch: LatencyWatch,
     queues: Callable[[], Queues],
-    longest_turn_s: Callable[[Instant], float],
 ) -> APIRouter:
     """The endpoints that machines ask."""
     routes = APIRouter(tags=["health"])
@@ -201,15 +185,7 @@ def router(
     async def metrics() -> Response:
         """Counters, hops, latency and safety in Prometheus' text format."""
         now = clock()
-        families = [
-            *_families(health(now), watch, queues()),
-            _family(
-                "gauge",
-                "loop_longest_turn_seconds",
-                "CPU time of the longest turn of the loop in the last two minutes.",
-                {"": round(longest_turn_s(now), 4)},
-            ),
-        ]
+        families = _families(health(now), watch, queues())
         latency: _Latency = [
             ((one.robot_id, one.data, hop), part.count, part.total, part.parts("1min"))
             for one in watch.streams
@@ -218,7 +194,7 @@ def router(
         ]
         # Twenty robots have 300 sketches to sum up: beside the loop, not in it.
         text = await asyncio.to_thread(
-            lambda: generate_latest(_Told([*families, _summary(latency)]))
+            lambda: generate_latest(_Computed([*families, _summary(latency)]))
         )
         return Response(text, media_type=CONTENT_TYPE_PLAIN_0_0_4)
 

@@ -227,4 +227,6 @@ async def test_json_that_nobody_can_use_is_orions_fault_and_kills_nothing(
         async with malformed.running() as site:
             await until(lambda: site.health_monitor.notify_error)
 
-    assert site.health_monitor.notify_error == "answered JSON that means nothing here"
+    assert (
+        site.health_monitor.notify_error == "answered something that means nothing here"
+    )

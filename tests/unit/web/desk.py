@@ -59,7 +59,7 @@ class WebDesk(Desk):
         super().__init__(robots, greenhouse, tiles=tiles)
         self.heard: list[Instant] = []
         self.former_secrets: set[str] = set()
-        self.queues = health.Queues({"ingest": 3}, {"history": 2}, {"stop_send": 1})
+        self.queues = health.Queues({"ingest": 3}, {"history": 2})
         self.trail = AuditTrail(self.sink, self.ids)
         self.book, self.passwords = FakeBook(), FakePasswords()
         self.people = People(self.book, self.passwords, self.clock)
