@@ -148,10 +148,6 @@ class Stage:
     def alerts(self) -> list[Json]:
         return [one.model_dump() for one in self._views.alerts()]
 
-    def safety(self) -> Json:
-        """How soon robots obeyed, as the Fleet page tells it."""
-        return self._views.safety(self.now).model_dump()
-
     def log(self, robot_id: str | None, key: str) -> list[Json]:
         """Lines whose key begins so, oldest first; of one robot or of all."""
         told = self._views.log(list(self.desk.event_log.lines))

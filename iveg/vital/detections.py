@@ -8,7 +8,7 @@ that are neither), and each detection that a decision rests on
 """
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import NamedTuple
@@ -194,12 +194,6 @@ class DetectionTracking:
     def subjects(self) -> int:
         """Number of persons whose last log line is remembered."""
         return len(self._logged_at)
-
-    def people_of(self, robot_id: str) -> Iterator[str]:
-        """Ids of those whom a robot's newest look found."""
-        for one in self.placed.get(robot_id, ()):
-            if one.person is not None:
-                yield one.person.person_id
 
     def track_frame(
         self,

@@ -68,8 +68,6 @@ def _family(
 
 
 def _families(health: Health, watch: LatencyWatch, queues: Queues) -> list[Metric]:
-    latency, asked = health.safety.alert_latency, health.safety.not_echoed
-    shares = {"0.5": latency.p50_ms, "0.95": latency.p95_ms, "0.99": latency.p99_ms}
     return [
         _family(
             "counter",
@@ -122,28 +120,6 @@ def _families(health: Health, watch: LatencyWatch, queues: Queues) -> list[Metri
             "queue",
         ),
         _family("counter", "retries", "Repeated operations.", queues.retries, "what"),
-        _family(
-            "gauge",
-            "alert_latency_seconds",
-            "From a detection of a person to the robot's report, last five minutes.",
-            {
-                share: None if ms is None else ms / 1000.0
-                for share, ms in shares.items()
-            },
-            "quantile",
-        ),
-        _family(
-            "gauge",
-            "alerts_not_echoed",
-            "Alerts without an answer within one second, last five minutes.",
-            {"": asked.count},
-        ),
-        _family(
-            "gauge",
-            "alerts_asked",
-            "Alerts that required an answer, last five minutes.",
-            {"": asked.of},
-        ),
     ]
 
 
