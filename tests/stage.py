@@ -139,12 +139,6 @@ class Stage:
             one for one in records if (one.robot_id, one.class_) == (robot_id, class_)
         ]
 
-    def kept(self) -> tuple[list[DecisionRecord], list[DetectionRecord]]:
-        """Decisions as they stand now, and the detections of the history."""
-        records = self.desk.records(DecisionRecord)
-        newest = {one.decision_id: one for one in records}
-        return list(newest.values()), self.desk.records(DetectionRecord)
-
     def alerts(self) -> list[Json]:
         return [one.model_dump() for one in self._views.alerts()]
 

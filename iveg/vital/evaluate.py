@@ -219,8 +219,6 @@ class Evaluator:
             self._event_log.decisions(ended)
             return
         self.protected_unseen += not entry.in_sight
-        if entry.zone.sighting is not None:
-            self.tracking.kept.keep_evidence(entry.zone.cause, entry.zone.sighting)
         places = places_of(entry, self.world)
         begun = self.decisions.begin(entry, self.rule, places)
         self._event_log.decisions([begun])
