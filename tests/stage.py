@@ -139,18 +139,8 @@ class Stage:
             one for one in records if (one.robot_id, one.class_) == (robot_id, class_)
         ]
 
-    def kept(self) -> tuple[list[DecisionRecord], list[DetectionRecord]]:
-        """Decisions as they stand now, and the detections of the history."""
-        records = self.desk.records(DecisionRecord)
-        newest = {one.decision_id: one for one in records}
-        return list(newest.values()), self.desk.records(DetectionRecord)
-
     def alerts(self) -> list[Json]:
         return [one.model_dump() for one in self._views.alerts()]
-
-    def safety(self) -> Json:
-        """How soon robots obeyed, as the Fleet page tells it."""
-        return self._views.safety(self.now).model_dump()
 
     def log(self, robot_id: str | None, key: str) -> list[Json]:
         """Lines whose key begins so, oldest first; of one robot or of all."""

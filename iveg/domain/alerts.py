@@ -5,25 +5,12 @@ alerts that it keeps (docs/dashboard.md, "Alerts").  A condition that ends clear
 alert; one that returns is the same alert, one occurrence more.  One row stands for all
 of them, but never for less than the gravest unacknowledged occurrence: grouping cannot
 hide an escalation.
-
-Last comes the acknowledgement latency: how soon the fleet obeys its speed limits
-(docs/safety.md).  The time runs from the notification of the detection frame that a
-slow-down rests on to the robot's own report that it applies the factor.  Both are read
-on the server's clock, so no other clock has to be believed.  The way from camera to
-iVeg is left out: only the robot's clock could tell it.
-
-A robot judges the feedback by its own pose, and may report a slow-down before iVeg
-finds the robot inside the zone.  It is then timed from the newest frame that the fleet
-had received by then.  A robot that drives into a zone of which no frame is recent
-counts as asked and acknowledged, but its time says nothing of the way.  A robot that
-was slow for another reason is not asked.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from math import ceil, inf
+from math import inf
 
-from iveg.domain.decisions import SlowdownDecision
 from iveg.domain.detection_rule import RECOVERED, DetectionRule
 from iveg.domain.events import Condition, Priority, Slot
 from iveg.domain.feedback import SpeedLimit
@@ -445,78 +432,3 @@ def _subject(record: AlertRecord) -> str:
 def _moment(wall: float, now: Instant) -> Instant:
     """A moment of an earlier run on this run's clock."""
     return Instant(now.mono - (now.wall - wall), wall)
-
-
-def nearest_rank(known: Sequence[float], share: float) -> float | None:
-    """Nearest-rank percentile of sorted values (``share`` 0 to 1); None without any."""
-    return known[max(0, ceil(share * len(known)) - 1)] if known else None
-
-
-WINDOW_S = 300.0
-ECHO_S = 1.0
-"""A robot that has not answered by then has not echoed."""
-
-
-@dataclass(frozen=True, slots=True)
-class Acknowledgements:
-    """The alerts of the last minutes, as robots acknowledged them.
-
-    Attributes:
-        timed: How many answers could be timed.
-        p50_s: That half of them did not exceed (s); ``p95_s``, ``p99_s`` likewise.
-        echo_age_s: Of the newest timed answer (s).
-        asked: How many alerts should have been answered by now.
-        missed: How many of those were not, within ``ECHO_S``.
-        asked_age_s: Since the newest of those (s).
-    """
-
-    timed: int = 0
-    p50_s: float | None = None
-    p95_s: float | None = None
-    p99_s: float | None = None
-    echo_age_s: float | None = None
-    asked: int = 0
-    missed: int = 0
-    asked_age_s: float | None = None
-
-
-def acknowledgements_of(
-    decisions: Iterable[SlowdownDecision], now: Instant
-) -> Acknowledgements:
-    """Acknowledgement latencies of the decisions in memory, last five minutes."""
-    recent = [
-        one
-        for one in decisions
-        if now.mono - one.entry.entered.mono <= WINDOW_S
-        # A robot that was slow for something else was not asked; one that braked
-        # ahead of its zone was.
-        and (one.answered is not None or not one.entry.already_slow)
-    ]
-    due = [
-        one
-        for one in recent
-        if now.mono - one.entry.entered.mono > ECHO_S or _is_acknowledged(one)
-    ]
-    timed = [one for one in recent if one.took_s is not None]
-    took = sorted(one.took_s for one in timed if one.took_s is not None)
-    return Acknowledgements(
-        timed=len(took),
-        p50_s=nearest_rank(took, 0.50),
-        p95_s=nearest_rank(took, 0.95),
-        p99_s=nearest_rank(took, 0.99),
-        echo_age_s=_age((one.answered_at for one in timed), now),
-        asked=len(due),
-        missed=sum(not _is_acknowledged(one) for one in due),
-        asked_age_s=_age((one.entry.entered.mono for one in due), now),
-    )
-
-
-def _is_acknowledged(decision: SlowdownDecision) -> bool:
-    applied, entry = decision.applied, decision.entry
-    is_in_time = applied is not None and applied.mono - entry.entered.mono <= ECHO_S
-    return entry.told_before or is_in_time
-
-
-def _age(moments: Iterable[float | None], now: Instant) -> float | None:
-    newest = max((at for at in moments if at is not None), default=None)
-    return None if newest is None else now.mono - newest

@@ -8,21 +8,11 @@ Every link has a time and a verdict; a link that does not come in time raises an
 
 A link is ``open`` while it may still come and never for longer: it comes, is missing,
 or iVeg itself is interrupted and its end is ``unknown``.
-
-Notices: when iVeg was notified of each person; acknowledgement is timed from there.
-
-A robot judges the feedback by its own pose and is often ahead of iVeg: its report that
-it slows for an alert comes before iVeg finds it inside the ring.  It is timed all the
-same, from the newest frame that robots had received by then::
-
-    frame notified ──> feedback ──> robot slows, reports ──> (iVeg finds it inside)
-         └────────────── timed ──────────────┘
 """
 
-from collections import deque
-from collections.abc import Callable, Container, Iterable
-from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED
@@ -74,9 +64,6 @@ class SlowdownDecision:
         speed_after: Speed at ``observed`` (m/s).
         waited_out: Whether every link has come or is missing.
         interrupted: iVeg went away while it was open; ``ended`` is when that was.
-        noticed: Arrival of the look that it rests on (monotonic, s); None for a zone
-            that was known before.
-        answered: When a robot that was ahead said that it slows (monotonic, s).
         places: Where the robot that is slowed and the observer were.
     """
 
@@ -89,26 +76,7 @@ class SlowdownDecision:
     speed_after: float | None = None
     waited_out: bool = False
     interrupted: bool = False
-    noticed: float | None = None
-    answered: float | None = None
     places: tuple[Place, ...] = ()
-
-    @property
-    def answered_at(self) -> float | None:
-        """When the robot said that it slows for it (monotonic, s); None: never."""
-        if self.answered is not None:
-            return self.answered
-        if self.applied is None or self.entry.told_before:
-            return None
-        return self.applied.mono
-
-    @property
-    def took_s(self) -> float | None:
-        """From the frame to the robot's own report (s); None where one is missing."""
-        answered_at = self.answered_at
-        if answered_at is None or self.noticed is None:
-            return None
-        return answered_at - self.noticed
 
     @property
     def decision_id(self) -> str:
@@ -121,8 +89,7 @@ class SlowdownDecision:
 
     def reported(self, report: SafetyReport, at: Instant) -> "SlowdownDecision":
         """The robot said what it applies."""
-        obeys = report.speed_factor <= HALF_SPEED
-        if self.applied is not None or not obeys or self.ended is not None:
+        if self.applied is not None or report.speed_factor > HALF_SPEED:
             return self
         return replace(self, applied=at)
 
@@ -132,9 +99,9 @@ class SlowdownDecision:
             return self
         return replace(self, observed=at, speed_after=speed)
 
-    def closed(self, at: Instant) -> "SlowdownDecision":
-        """The robot was let go."""
-        return replace(self, ended=at)
+    def closed(self, at: Instant, *, interrupted: bool = False) -> "SlowdownDecision":
+        """The robot was let go, or iVeg stops and the end stays unknown."""
+        return replace(self, ended=at, interrupted=interrupted)
 
     def aged(self, heard_s: float) -> "SlowdownDecision":
         """Let time pass; a link that did not come is missing from now on.
@@ -146,10 +113,6 @@ class SlowdownDecision:
         if self.waited_out or heard_s < MISSING_S:
             return self
         return replace(self, waited_out=True)
-
-    def broken_off(self, at: Instant) -> "SlowdownDecision":
-        """Close the decision unfinished: iVeg stops, and its end stays unknown."""
-        return replace(self, ended=at, interrupted=True)
 
     def links(self) -> tuple[Link, ...]:
         """The chain as it stands."""
@@ -202,16 +165,10 @@ class Decisions:
     def __init__(self, keep: int = 200) -> None:
         self._keep = keep
         self._all: dict[str, SlowdownDecision] = {}
-        self._first_reports = FirstReports()
 
     def get(self, decision_id: str) -> SlowdownDecision | None:
         """One decision that is still in memory."""
         return self._all.get(decision_id)
-
-    @property
-    def known(self) -> Iterable[SlowdownDecision]:
-        """All that are in memory: the open ones and the newest that ended."""
-        return self._all.values()
 
     @property
     def open(self) -> list[SlowdownDecision]:
@@ -222,15 +179,7 @@ class Decisions:
         self, entry: ZoneEntry, rule: DetectionRule, places: Iterable[Place] = ()
     ) -> SlowdownDecision:
         """Open the decision of an entry; the oldest ended ones make room."""
-        notice = self._first_reports.of(entry)
-        noticed, answered = (None, None) if notice is None else notice
-        decision = SlowdownDecision(
-            entry,
-            rule,
-            noticed=noticed,
-            answered=answered,
-            places=tuple(places),
-        )
+        decision = SlowdownDecision(entry, rule, places=tuple(places))
         self._all[decision.decision_id] = decision
         if len(self._all) > self._keep:
             ended = (key for key, one in self._all.items() if one.ended is not None)
@@ -242,11 +191,6 @@ class Decisions:
         one = self._all.get(decision_id)
         return [] if one is None else self._change([one], lambda one: one.closed(at))
 
-    def seen(self, people: Iterable[str], at: Instant) -> None:
-        """A frame that shows these people was notified."""
-        for person_id in people:
-            self._first_reports.seen(person_id, at)
-
     def moved(
         self, robot_id: str, speed: float, at: Instant, *, is_slow: bool
     ) -> list[SlowdownDecision]:
@@ -254,32 +198,25 @@ class Decisions:
         some = self._open_of(robot_id) if is_slow else ()
         return self._change(some, lambda one: one.slowed(speed, at))
 
-    def reported(
-        self, report: SafetyReport, published_at: float, at: Instant
-    ) -> list[SlowdownDecision]:
-        """A robot says what it applies; feedback last went out at ``published_at``."""
-        self._first_reports.reported(report, published_at, at)
-        return self._change(
-            self._open_of(report.robot_id), lambda one: one.reported(report, at)
-        )
+    def reported(self, report: SafetyReport, at: Instant) -> list[SlowdownDecision]:
+        """A robot says what it applies."""
+        some = self._open_of(report.robot_id)
+        return self._change(some, lambda one: one.reported(report, at))
 
     def published(self, at: Instant) -> list[SlowdownDecision]:
         """Feedback was published."""
         return self._change(self.open, lambda one: one.published(at))
 
-    def age(
-        self, heard_s: Callable[[ZoneEntry], float], known: Container[str]
-    ) -> list[SlowdownDecision]:
-        """Time passes; notices of persons who are no longer known are forgotten.
+    def age(self, heard_s: Callable[[ZoneEntry], float]) -> list[SlowdownDecision]:
+        """Time passes.
 
         ``heard_s``: how long an entry's robot has been heard since it began (s).
         """
-        self._first_reports.forget(known)
         return self._change(self.open, lambda one: one.aged(heard_s(one.entry)))
 
     def break_off(self, at: Instant) -> list[SlowdownDecision]:
         """End every open one: iVeg stops."""
-        return self._change(self.open, lambda one: one.broken_off(at))
+        return self._change(self.open, lambda one: one.closed(at, interrupted=True))
 
     def _open_of(self, robot_id: str) -> list[SlowdownDecision]:
         return [one for one in self.open if one.entry.robot_id == robot_id]
@@ -292,73 +229,3 @@ class Decisions:
         changed = [after for one in some if (after := step(one)) is not one]
         self._all.update({one.decision_id: one for one in changed})
         return changed
-
-
-FRESH_S = 0.25
-"""Without a newer frame a ring was known: a robot that enters it is not timed."""
-_KEPT = 16
-_UNTIMED = "", 0.0, 0.0
-
-
-class FirstReport(NamedTuple):
-    """The notification that an acknowledgement is timed from.
-
-    Attributes:
-        at: Arrival of its notification (monotonic, s).
-        answered: When the robot said that it slows (monotonic, s); None where that is
-            still to come.
-    """
-
-    at: float
-    answered: float | None = None
-
-
-@dataclass(slots=True)
-class FirstReports:
-    """Notifications by person, and robots that slowed for an alert by themselves."""
-
-    _detections: dict[str, deque[float]] = field(default_factory=dict)
-    _ahead: dict[str, tuple[str, float, float]] = field(default_factory=dict)
-    """Slow robot → alert, when it first said so, when feedback had gone out before."""
-
-    def seen(self, person_id: str, at: Instant) -> None:
-        """Note the notification of a frame that shows this person."""
-        frames = self._detections.setdefault(person_id, deque(maxlen=_KEPT))
-        frames.append(at.mono)
-
-    def reported(self, report: SafetyReport, published_at: float, at: Instant) -> None:
-        """Note a safety report; feedback last went out at ``published_at``."""
-        robot_id, alert = report.robot_id, report.decision_id or ""
-        if report.speed_factor > HALF_SPEED:
-            self._ahead.pop(robot_id, None)
-        elif robot_id not in self._ahead:
-            self._ahead[robot_id] = alert, at.mono, published_at
-        elif self._ahead[robot_id][0] != alert:
-            # Slow for something else already: that it names this too times nothing.
-            self._ahead[robot_id] = _UNTIMED
-
-    def of(self, entry: ZoneEntry) -> FirstReport | None:
-        """The notice of an entry; None where there is none."""
-        zone = entry.zone
-        if zone.sighting is None:
-            return None
-        if not entry.told_before:
-            return self._notice(zone.cause, entry.entered.mono)
-        alert, answered, published_at = self._ahead.get(entry.robot_id, _UNTIMED)
-        if alert != zone.alert_id:
-            return None
-        return self._notice(zone.cause, published_at, answered)
-
-    def _notice(
-        self, person_id: str, before: float, answered: float | None = None
-    ) -> FirstReport | None:
-        frames = [at for at in self._detections.get(person_id, ()) if at <= before]
-        now = before if answered is None else answered
-        if not frames or now - frames[-1] > FRESH_S:
-            return None
-        return FirstReport(frames[-1], answered)
-
-    def forget(self, known: Container[str]) -> None:
-        """Keep only persons who are still known."""
-        for person_id in [one for one in self._detections if one not in known]:
-            del self._detections[person_id]

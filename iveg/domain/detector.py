@@ -10,18 +10,14 @@ service.
 """
 
 import math
-from dataclasses import dataclass, field, replace
-from operator import is_
+from dataclasses import dataclass, field
 from typing import Literal
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS
-from iveg.domain.observations import Detection, DetectionFrame, Instant
+from iveg.domain.observations import DetectionFrame, Instant
 from iveg.domain.words import HeardWords
 
-CLASS_NAMES = 200
-"""Classes of one robot that keep their name; every further one is "other"."""
-OTHER = "other"
 _MOST_NAMES = 4
 FRAMES_HZ = 45.0
 """Most frames of a robot in the mean of a second; the contract's rate is 30 Hz."""
@@ -87,7 +83,6 @@ class DetectorEvidence:
         out_of_service: None: it is required.
         words: What it says, by its name: of the four that came last.
         blind_by: The robot that sees somebody whom its camera does not show.
-        class_names: Names that it gave to what is neither a person nor a robot.
     """
 
     whole_at: float | None = None
@@ -96,7 +91,6 @@ class DetectorEvidence:
     out_of_service: OutOfService | None = None
     words: dict[str, HeardWords] = field(default_factory=dict)
     blind_by: str | None = None
-    class_names: set[str] = field(default_factory=set)
     _allowance: float = FRAMES_HZ
     _counted_at: float | None = None
 
@@ -116,25 +110,6 @@ class DetectorEvidence:
         admitted = self._allowance >= 1.0
         self._allowance -= admitted
         return admitted
-
-    def bounded(self, frame: DetectionFrame, rule: DetectionRule) -> DetectionFrame:
-        """A frame whose classes are known names of this detector, or ``OTHER``.
-
-        The rule's own classes are never lost to the bound.
-        """
-        named = tuple(self._named(one, rule) for one in frame.detections)
-        if all(map(is_, named, frame.detections)):
-            return frame
-        return replace(frame, detections=named)
-
-    def _named(self, detection: Detection, rule: DetectionRule) -> Detection:
-        class_id = detection.class_id
-        if class_id in self.class_names or rule.class_of(class_id) is not None:
-            return detection
-        if len(self.class_names) >= CLASS_NAMES:
-            return replace(detection, class_id=OTHER)
-        self.class_names.add(class_id)
-        return detection
 
     def note_whole(self, measured_at: float | None) -> None:
         """Note a frame that was read whole; None: nobody knows its age."""

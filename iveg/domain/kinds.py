@@ -82,7 +82,6 @@ class Kind:
         speaks_alone: Whether its device may also speak to iVeg alone, past the agent.
         floor_hz: Least rate through the agent while Orion is behind; None: its own.
         ordered: By the robot's own count, or by arrival.
-        may_drop: Whether the oldest gives way when more comes than can be taken.
         lands: Member of ``RobotState`` or ``World`` that keeps the newest; None for an
             event: the machine of its command or the health monitor takes it.
         changes: Live topic that is new with it; those of detections depend on what is
@@ -101,7 +100,6 @@ class Kind:
     speaks_alone: bool = False
     floor_hz: float | None = None
     ordered: Literal["counted", "by arrival"] = "counted"
-    may_drop: bool = True
     lands: str | None = None
     changes: Literal["robot", "scan", "climate"] | None = None
     direct: Scope = "off"
@@ -157,7 +155,6 @@ KINDS = (
         (("bounding_boxes", "object"), ("detection_header", "object")),
         speaks_alone=True,
         floor_hz=3.2,
-        may_drop=False,
         lands="frame",
         direct="safety",
         qos=1,
@@ -169,7 +166,6 @@ KINDS = (
         "_safety",
         (("safety_state", "object"),),
         speaks_alone=True,
-        may_drop=False,
         lands="safety",
         changes="robot",
         direct="safety",
@@ -196,12 +192,11 @@ KINDS = (
     Kind(
         CommandAnswer,
         "answer",
-        may_drop=False,
         direct="safety",
         qos=1,
         vital=True,
     ),
-    Kind(GoalAnswer, "goal_answer", may_drop=False, direct="safety", qos=1),
+    Kind(GoalAnswer, "goal_answer", direct="safety", qos=1),
     Kind(Climate, "climate", ordered="by arrival", lands="climate", changes="climate"),
     Kind(HeartbeatProbe, "heartbeat", ordered="by arrival", vital=True),
 )

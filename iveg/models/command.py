@@ -1,13 +1,12 @@
 """STOP, release and resume as people follow them, live and remembered."""
 
 from collections.abc import Iterable, Sequence
-from math import isfinite
+from math import ceil, isfinite
 from typing import Annotated, Any, Self
 
 from pydantic import Field
 
 from iveg.domain import stop
-from iveg.domain.alerts import nearest_rank
 from iveg.domain.goals import GoalKind
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
@@ -294,9 +293,9 @@ class LatencySpread(Model):
         known = sorted(value for value in values if value is not None)
         return cls(
             count=len(known),
-            p50_ms=nearest_rank(known, 0.50),
-            p95_ms=nearest_rank(known, 0.95),
-            max_ms=nearest_rank(known, 1.0),
+            p50_ms=_nearest_rank(known, 0.50),
+            p95_ms=_nearest_rank(known, 0.95),
+            max_ms=_nearest_rank(known, 1.0),
         )
 
 
@@ -336,3 +335,8 @@ class Latency(Model):
     since: Stamp
     until: Stamp
     robots: list[RobotLatency]
+
+
+def _nearest_rank(known: Sequence[float], share: float) -> float | None:
+    """Nearest-rank percentile of sorted values (``share`` 0 to 1); None without any."""
+    return known[max(0, ceil(share * len(known)) - 1)] if known else None

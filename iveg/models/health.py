@@ -1,83 +1,12 @@
-"""Health of the data path, latency hop by hop, recordings; how soon robots obey."""
+"""Health of the data path, latency hop by hop, and recordings."""
 
 from typing import Literal, Self
 
 from pydantic import Field
 
-from iveg.domain.alerts import ECHO_S, WINDOW_S, Acknowledgements
 from iveg.domain.latency import Data, Window
 from iveg.domain.recordings import RecordingFile
 from iveg.models.base import Hundredth, Model, Stamp, Tenth
-
-
-class AlertLatency(Model):
-    """From the frame that a slow-down rests on to the robot's own report (ms).
-
-    From the notification of the newest detection frame with the person to the robot's
-    own report of the factor, on the server's clock. A robot that judged ahead of iVeg
-    is timed by when it said so, from the newest frame that it had been told of. A robot
-    that drives into a zone of which nobody has a frame for 0.25 s is not timed.
-
-    Attributes:
-        p50_ms: Quantiles (ms).
-        p95_ms: Quantiles (ms).
-        p99_ms: Quantiles (ms).
-        count: Samples.
-        window_s: 300 (s).
-        age_s: Of the newest sample (s).
-    """
-
-    p50_ms: Tenth | None
-    p95_ms: Tenth | None
-    p99_ms: Tenth | None
-    count: int
-    window_s: float = WINDOW_S
-    age_s: Tenth | None
-
-
-class NotAcknowledged(Model):
-    """Alerts that a robot did not answer in time, of those that it should have.
-
-    Alerts that a robot did not acknowledge in time. A robot that was slow for something
-    else is not asked; one that had judged the alert itself has answered.
-
-    Attributes:
-        count: Not acknowledged.
-        of: Asked.
-        within_s: 1.0 (s).
-        window_s: 300 (s).
-        age_s: Of the newest (s).
-    """
-
-    count: int
-    of: int
-    within_s: float = ECHO_S
-    window_s: float = WINDOW_S
-    age_s: Tenth | None
-
-
-class Safety(Model):
-    """Reaction times of the fleet."""
-
-    alert_latency: AlertLatency
-    not_echoed: NotAcknowledged
-
-    @classmethod
-    def of(cls, acknowledgements: Acknowledgements) -> Self:
-        """As it stands now."""
-        latency = AlertLatency(
-            p50_ms=in_ms(acknowledgements.p50_s),
-            p95_ms=in_ms(acknowledgements.p95_s),
-            p99_ms=in_ms(acknowledgements.p99_s),
-            count=acknowledgements.timed,
-            age_s=acknowledgements.echo_age_s,
-        )
-        missed = NotAcknowledged(
-            count=acknowledgements.missed,
-            of=acknowledgements.asked,
-            age_s=acknowledgements.asked_age_s,
-        )
-        return cls(alert_latency=latency, not_echoed=missed)
 
 
 def in_ms(seconds: float | None) -> float | None:
@@ -108,19 +37,17 @@ class HopHealth(Model):
 
 
 class Health(Model):
-    """State of the data path, counters, and reaction times of the fleet.
+    """State of the data path, and counters.
 
     Attributes:
         ok: Every hop is.
         hops: One for each hop.
         counters: Events by name.
-        safety: How soon the fleet obeys.
     """
 
     ok: bool
     hops: list[HopHealth]
     counters: dict[str, int]
-    safety: Safety
     earlier: Literal["known", "reading", "unknown"] = Field(
         description="State of the records of earlier runs."
     )

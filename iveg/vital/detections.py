@@ -2,15 +2,15 @@
 
 A detector sends thirty frames a second, by which a person who stands before a camera
 would fill log and disk.  A sighting is logged at its start; the history gets one row in
-half a second for each robot and subject (a person, a peer, or all boxes of one class
-that are neither), and each detection that a decision rests on
-(docs/interfaces/http.md, "Detections that are kept").  Memory has each for a while.
+half a second for each robot and subject: a person, a peer, or all boxes that are
+neither and are judged alike (docs/interfaces/http.md, "Detections that are kept").
+Memory has each for a while.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
 from itertools import islice
+from math import inf
 from typing import NamedTuple
 
 from iveg.domain.detection_rule import DetectionRule
@@ -22,119 +22,28 @@ from iveg.domain.records import DetectionRecord
 from iveg.domain.robot_state import RobotState
 from iveg.domain.stream_order import OrderVerdict
 from iveg.domain.tracking.people import Placed
-from iveg.domain.tracking.person import Sighting, TrackedPerson
+from iveg.domain.tracking.person import TrackedPerson
 from iveg.domain.tracking.sight import BlindCameras, Look, OwnSight
 from iveg.domain.words import HeardWords, meaning_of, name_numbers, plain
 from iveg.vital import topics
 from iveg.vital.core import Core
-from iveg.vital.event_log import EventLog, detection_of
+from iveg.vital.event_log import detection_of
 from iveg.vital.record import ODOMETRY_PERIOD_S
 
 _LOGGED_S = 2.0
-_MAX_SUBJECTS = 1000
-KEPT_EVERY_S = ODOMETRY_PERIOD_S
+# Frames come at 10 or 30 Hz: half a frame early must not wait a whole one.
+_KEPT_EVERY_S = 0.95 * ODOMETRY_PERIOD_S
 MOST_DETECTIONS = 5000
 """Two robots that see three objects, at 30 frames a second, fill it in 30 s."""
 _MAX_FRAMES = 20
 """Names of unknown frames that are logged, of each robot."""
+_Subject = tuple[str, str]
+"""A robot, and what it saw."""
 _KEYS = {
     "alert": "log.detection",
     "faint": "log.detection_faint",
     "other": "log.detection_unmapped",
 }
-
-
-@dataclass(frozen=True, slots=True)
-class _Look:
-    """One detection with what its row needs; ``is_kept``: it has its row."""
-
-    one: Placed
-    frame: DetectionFrame
-    received: Received
-    is_kept: bool
-
-
-class KeptDetections:
-    """Chooses the detections that become rows.
-
-    A look is remembered while it is the newest of a chain of sightings, because a robot
-    may enter the zone of a person seconds after they were seen.
-    """
-
-    def __init__(self, event_log: EventLog) -> None:
-        self._event_log = event_log
-        self._kept_at: dict[tuple[str, str], float] = {}
-        self._looks: dict[tuple[str, str], Sequence[_Look]] = {}
-
-    def look(
-        self, one: Placed, subject: str, frame: DetectionFrame, received: Received
-    ) -> None:
-        """Keep a detection if one of its subject is due, and remember it."""
-        key, now = (frame.robot_id, subject), received.at.mono
-        # Frames come at 10 or 30 Hz: half a frame early must not wait a whole one.
-        is_due = now - self._kept_at.get(key, -1e9) >= 0.95 * KEPT_EVERY_S
-        if not is_due and one.person is None:
-            return
-        look = _Look(one, frame, received, is_kept=is_due)
-        if is_due:
-            self._kept_at[key] = now
-            self._record(look)
-        if one.person is not None:
-            alive = one.person.sightings
-            before = self._looks.get(key, ())
-            self._looks[key] = [
-                *(old for old in before if _is_among(old, alive)),
-                look,
-            ]
-
-    def keep_evidence(self, person_id: str, sighting: Sighting) -> None:
-        """Keep the detection that a decision rests on, unless it has its row."""
-        key = sighting.observer, person_id
-        looks = self._looks.get(key, ())
-        # The newest first: twins of two transports are told apart by nothing.
-        for look in reversed(looks):
-            if _is_of(look, sighting):
-                if not look.is_kept:
-                    self._record(look)
-                self._looks[key] = [
-                    replace(one, is_kept=True) if one is look else one for one in looks
-                ]
-                return
-
-    def forget(self, now: Instant) -> None:
-        """Forget subjects who are gone."""
-        if len(self._kept_at) > _MAX_SUBJECTS:
-            self._kept_at = {
-                key: at
-                for key, at in self._kept_at.items()
-                if now.mono - at < LIMITS.zone_lasts_s
-            }
-            self._looks = {
-                key: looks for key, looks in self._looks.items() if key in self._kept_at
-            }
-
-    def _record(self, look: _Look) -> None:
-        self._event_log.detection(look.one, look.frame, look.received)
-
-
-def _is_among(look: _Look, sightings: Sequence[Sighting]) -> bool:
-    return any(_is_of(look, one) for one in sightings)
-
-
-def _is_of(look: _Look, sighting: Sighting) -> bool:
-    """Whether a sighting is of this detection; of one without a place its confidence.
-
-    A doubtful position is its observer's own (``Sighting``).
-    """
-    one = look.one
-    x, y, z = one.position
-    is_there = bool(sighting.reach_m) or (sighting.x, sighting.y, sighting.z) == (
-        x,
-        y,
-        z,
-    )
-    is_same = one.detection.probability == sighting.confidence
-    return is_same and is_there and look.frame.robot_id == sighting.observer
 
 
 class JudgedDetection(NamedTuple):
@@ -172,14 +81,12 @@ class DetectionTracking:
     Attributes:
         placed: What each robot's newest look found, faint ones included.
         other: When the newest confident object of another class came, by robot.
-        kept: Chooses the detections that become rows.
         newest: Each detection of the last moments.
     """
 
     def __init__(self, core: Core) -> None:
         self.placed: dict[str, list[Placed]] = {}
         self.other: dict[str, Instant] = {}
-        self.kept = KeptDetections(core.event_log)
         self.newest = NewestDetections()
         self._world, self._people = core.world, core.people
         self._greenhouse = core.greenhouse
@@ -187,19 +94,10 @@ class DetectionTracking:
         self._blind = BlindCameras(core.greenhouse)
         self._event_log, self._new_id = core.event_log, core.ports.new_id
         self._tell = core.supervision.tell
-        self._logged_at: dict[tuple[str, str], float] = {}
+        self._kept_at: dict[_Subject, float] = {}
+        """When a subject's newest row was made; ``_logged_at`` when it was seen (s)."""
+        self._logged_at: dict[_Subject, float] = {}
         self._unknown_frames: dict[str, set[str]] = {}
-
-    @property
-    def subjects(self) -> int:
-        """Number of persons whose last log line is remembered."""
-        return len(self._logged_at)
-
-    def people_of(self, robot_id: str) -> Iterator[str]:
-        """Ids of those whom a robot's newest look found."""
-        for one in self.placed.get(robot_id, ()):
-            if one.person is not None:
-                yield one.person.person_id
 
     def track_frame(
         self,
@@ -227,7 +125,6 @@ class DetectionTracking:
         frame = name_numbers(frame, robot.description.classes)
         name = frame.detector or robot_id
         rule = rule.also_naming(self._world.word_answers.persons(name))
-        frame = detector.bounded(frame, rule)
         words = self._hear_words(frame, name, rule)
         placed = self._look(frame, received, rule, seen_at)
         turned_away, unplaced = self._people.turned_away, self._people.unplaced
@@ -322,19 +219,20 @@ class DetectionTracking:
         )
 
     def _describe(self, one: Placed, frame: DetectionFrame, received: Received) -> None:
+        """Keep, remember and log a detection, each as often as it is worth."""
         at, robot_id = received.at, frame.robot_id
-        subject = one.peer or (one.person.person_id if one.person else "")
-        subject = subject or f"{one.kind}:{one.detection.class_id}"
-        self.kept.look(one, subject, frame, received)
+        subject = robot_id, _name_of(one)
         self.newest.note(one, frame, received)
-        last = self._logged_at.get((robot_id, subject))
+        if at.mono - self._kept_at.get(subject, -inf) >= _KEPT_EVERY_S:
+            self._kept_at[subject] = at.mono
+            self._event_log.detection(one, frame, received)
         if one.kind == "other":
             self.other[robot_id] = at
-        if last is not None and at.mono - last < _LOGGED_S:
-            return
-        self._logged_at[robot_id, subject] = at.mono
-        if last is None or at.mono - last >= 2 * _LOGGED_S:
-            self._event_log.log(_line(one, robot_id, subject), at)
+        unseen_s = at.mono - self._logged_at.get(subject, -inf)
+        if unseen_s >= _LOGGED_S:
+            self._logged_at[subject] = at.mono
+        if unseen_s >= 2 * _LOGGED_S:
+            self._event_log.log(_line(one, *subject), at)
 
     def witness(self, report: SafetyReport, at: Instant) -> bool:
         """Track who walks near a robot of today by its own laser; whether one does."""
@@ -360,14 +258,22 @@ class DetectionTracking:
         )
 
     def forget(self, now: Instant) -> None:
-        """Forget log lines and rows about persons who are gone."""
-        self.kept.forget(now)
-        if len(self._logged_at) > _MAX_SUBJECTS:
-            self._logged_at = {
-                key: at
-                for key, at in self._logged_at.items()
-                if now.mono - at < LIMITS.zone_lasts_s
-            }
+        """Forget subjects who are gone."""
+        for moments in (self._kept_at, self._logged_at):
+            gone = [
+                subject
+                for subject, at in moments.items()
+                if now.mono - at > LIMITS.zone_lasts_s
+            ]
+            for subject in gone:
+                del moments[subject]
+
+
+def _name_of(one: Placed) -> str:
+    """The subject of a detection: a peer, a person, or all that is judged alike."""
+    if one.person is not None:
+        return one.person.person_id
+    return one.peer or f"{one.kind}:{one.class_ or ''}"
 
 
 def _walker_line(one: TrackedPerson, robot_id: str) -> LogEvent:

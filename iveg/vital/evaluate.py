@@ -9,7 +9,7 @@ falls silent and slows the robots.
 from collections.abc import Iterable, Sequence
 
 from iveg.domain import alerts
-from iveg.domain.decisions import Decisions, SlowdownDecision
+from iveg.domain.decisions import Decisions
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import Condition, LogEvent
 from iveg.domain.feedback import UNSUPERVISED, SpeedLimit
@@ -105,15 +105,6 @@ class Evaluator:
         decision = self.decisions.get(decision_id)
         return None if decision is None else record_of(decision)
 
-    def live_decisions(self) -> Iterable[SlowdownDecision]:
-        """Decisions in memory about live robots, without recordings."""
-        robots = self.world.robots
-        return (
-            one
-            for one in self.decisions.known
-            if not robots[one.entry.robot_id].is_replay
-        )
-
     # --- what arrives -------------------------------------------------------------
 
     def apply(self, received: Received) -> bool:
@@ -128,9 +119,6 @@ class Evaluator:
         observation = received.observation
         if isinstance(observation, DetectionFrame):
             self.tracking.track_frame(observation, received, verdict, self.rule)
-            self.decisions.seen(
-                self.tracking.people_of(observation.robot_id), received.at
-            )
         if verdict != "new":
             return False
         row, robot_id = kind(observation), observation.robot_id
@@ -183,9 +171,7 @@ class Evaluator:
 
     def _reported(self, report: SafetyReport, at: Instant, *, is_kept: bool) -> None:
         """Take a report; one that Orion kept says nothing of now and is no news."""
-        published_at = self._feedback_publisher.published_at
-        changed = self.decisions.reported(report, published_at, at)
-        self._event_log.decisions(changed)
+        self._event_log.decisions(self.decisions.reported(report, at))
         if is_kept:
             return
         measured_at = self.world.robot(report.robot_id).safety_received
@@ -233,8 +219,6 @@ class Evaluator:
             self._event_log.decisions(ended)
             return
         self.protected_unseen += not entry.in_sight
-        if entry.zone.sighting is not None:
-            self.tracking.kept.keep_evidence(entry.zone.cause, entry.zone.sighting)
         places = places_of(entry, self.world)
         begun = self.decisions.begin(entry, self.rule, places)
         self._event_log.decisions([begun])
@@ -261,8 +245,7 @@ class Evaluator:
         self._settle(now)
         if now.mono - self._feedback_publisher.published_at >= HEARTBEAT_S - _EARLY_S:
             self.publish(now)
-        aged = self.decisions.age(self._heard_s, self.people.known)
-        self._event_log.decisions(aged)
+        self._event_log.decisions(self.decisions.age(self._heard_s))
         self.alerts.sync([*self._conditions(now), *more], now)
 
     def _log_returned_detectors(self, now: Instant) -> None:

@@ -1,10 +1,9 @@
-"""The input of the pipeline: a bounded queue that prefers what safety needs.
+"""The input of the pipeline: a queue, bounded for each robot and kind.
 
-All transports end here.  When more comes than can be taken, the oldest telemetry of the
-same robot and kind is dropped and counted, or of the stream that has most waiting;
-safety reports, answers and detection frames only where they are most of what waits, or
-no telemetry does.  So a robot that floods drops its own.  A detection frame that is
-dropped counts as one that could not be read: somebody may have been in it.
+All transports end here.  When more comes of one robot and kind than can be taken, the
+oldest of these is dropped and counted: a robot that floods drops its own, and telemetry
+drops no safety report.  A detection frame that is dropped counts as one that could not
+be read: somebody may have been in it.
 """
 
 import asyncio
@@ -29,7 +28,8 @@ from iveg.vital.waiting import wait_set
 
 _log = logging.getLogger(__name__)
 
-MAX_QUEUED = 2000
+MOST_WAITING = 500
+"""Of one robot and kind, the newest: eleven seconds of a detector at 45 Hz."""
 _LINKED = tuple(kind.of for kind in KINDS if kind.speaks_alone)
 _GOES_ON = -1
 """Below every count."""
@@ -96,8 +96,8 @@ class Ingest:
             self.counters[f"{name}.duplicate"] += 1
             return
         stream = _stream(received)
-        if len(self._queue) >= MAX_QUEUED and not self._make_room(received, stream):
-            return
+        if self._waiting[stream] >= MOST_WAITING:
+            self._drop_oldest(stream)
         self._queue.append(received)
         if not received.asked:
             self._identities.add(_identity(received.observation))
@@ -194,50 +194,24 @@ class Ingest:
         """Return when something waits, or after a while."""
         await wait_set(self._wake, timeout_s)
 
-    def _make_room(self, received: Received, stream: "_Stream") -> bool:
-        """Drop the oldest of a stream; whether there is room for what comes.
-
-        Nothing that matters is dropped for telemetry, nor telemetry of others for a
-        stream that has enough waiting itself.
-        """
-        victim = self._victim_for(stream)
-        if victim is None:
-            self._note_dropped(received)
-            return False
+    def _drop_oldest(self, stream: "_Stream") -> None:
         index = next(
-            index for index, one in enumerate(self._queue) if _stream(one) == victim
+            index for index, one in enumerate(self._queue) if _stream(one) == stream
         )
         dropped = self._queue[index]
         del self._queue[index]
         self._forget(dropped)
-        self._note_dropped(dropped)
-        return True
-
-    def _victim_for(self, stream: "_Stream") -> "_Stream | None":
-        """The stream that loses its oldest; None: what comes is itself dropped."""
-        count = self._waiting.__getitem__
-        largest = max(self._waiting, key=count)
-        if count(stream) and (_may_drop(stream) or stream == largest):
-            return stream
-        telemetry = max(filter(_may_drop, self._waiting), key=count, default=None)
-        if telemetry is not None or _may_drop(stream):
-            return telemetry
-        return stream if count(stream) else largest
-
-    def _note_dropped(self, received: Received) -> None:
-        robot_id, kind = _stream(received)
+        robot_id, kind = stream
         self.counters[f"dropped.{kind.__name__}"] += 1
         if kind is DetectionFrame:
             self._refused[robot_id] = replace(
-                received, observation=RefusedFrame(robot_id)
+                dropped, observation=RefusedFrame(robot_id)
             )
 
     def _forget(self, received: Received) -> None:
         stream = _stream(received)
         self._identities.discard(_identity(received.observation))
         self._waiting[stream] -= 1
-        if not self._waiting[stream]:
-            del self._waiting[stream]
 
 
 _Stream = tuple[str, type[Observation]]
@@ -265,9 +239,3 @@ def _stream(received: Received) -> _Stream:
     """Robot and kind of a message."""
     observation = received.observation
     return observation.robot_id, type(observation)
-
-
-def _may_drop(stream: _Stream) -> bool:
-    """Whether it is telemetry, of which the newest says all, or a copy or refusal."""
-    row = KIND_OF.get(stream[1])
-    return row is None or row.may_drop

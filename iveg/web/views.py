@@ -6,7 +6,6 @@ from itertools import islice, takewhile
 
 from iveg.comfort.situations import Situations, fresh_report
 from iveg.domain import margins as margins_
-from iveg.domain.alerts import acknowledgements_of
 from iveg.domain.geometry import Pose2D
 from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import Instant
@@ -18,7 +17,7 @@ from iveg.domain.stop import FollowedCommand, StopMachine
 from iveg.domain.tracking.person import TrackedPerson
 from iveg.models.base import GreenhouseMap, Pose, Position, Scan, Twist, stamp
 from iveg.models.command import Command as CommandModel
-from iveg.models.health import Health, Safety
+from iveg.models.health import Health
 from iveg.models.health import HopHealth as HopModel
 from iveg.models.history import Alert, LogEntry
 from iveg.models.people import Acting, Detection, DetectionFrame, Evidence
@@ -294,19 +293,14 @@ class Views:
         return self.log(list(self._event_log.lines)[-_FIRST_LINES:])
 
     def health(self, now: Instant) -> Health:
-        """Every hop with its state and age, all counters, and the safety figures."""
+        """Every hop with its state and age, all counters."""
         hops = [_hop(one) for one in self._health_monitor.hops(now)]
         return Health(
             ok=all(hop.state == "ok" for hop in hops),
             hops=hops,
             counters=dict(sorted(self._counters().items())),
-            safety=self.safety(now),
             earlier=self._health_monitor.earlier(now),
         )
-
-    def safety(self, now: Instant) -> Safety:
-        """Reaction times of the fleet."""
-        return Safety.of(acknowledgements_of(self._evaluator.live_decisions(), now))
 
     def climate(self, now: Instant) -> Climate | None:
         """The newest reading of the air."""

@@ -21,5 +21,5 @@ def test_every_metric_has_its_row() -> None:
     found = re.findall(r'\(\s*"(counter|gauge)",\s*"([a-z_]+)"', told)
     metrics = {f"iveg_{name}{'_total' * (kind == 'counter')}" for kind, name in found}
 
-    assert len(metrics) > 10
+    assert len(metrics) > 5
     assert metrics - set(documents.keys(page)) == set()

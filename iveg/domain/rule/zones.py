@@ -9,7 +9,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS, grown_radius
 from iveg.domain.observations import Instant
@@ -170,8 +169,6 @@ class ZoneEntry(NamedTuple):
         zone: The nearest zone of the cause at trigger.
         distance_m: Now; ``entered_m`` at the trigger.
         outside_since: When it was first found outside (monotonic, s).
-        already_slow: It was slowed for something else: no slow-down will be seen.
-        told_before: It had judged this very zone itself and said so before.
         foretold_s: When it would reach the zone, at the trigger (s); None: it was
             inside.
         in_sight: Whether the robot saw it itself, or had a line of sight to the centre
@@ -186,8 +183,6 @@ class ZoneEntry(NamedTuple):
     speed_before: float
     in_sight: bool
     distance_m: float
-    already_slow: bool = False
-    told_before: bool = False
     outside_since: float | None = None
     foretold_s: float | None = None
 
@@ -227,8 +222,6 @@ def enter(
         in_sight=zone.observer == robot.robot_id
         or greenhouse.in_sight(pose.x, pose.y, zone.x, zone.y),
         distance_m=near.centre_m,
-        already_slow=_is_slow_already(robot, zone, speed),
-        told_before=_has_told(robot, zone),
         foretold_s=foretold_s,
     )
 
@@ -239,26 +232,3 @@ class LimitChange:
 
     entry: ZoneEntry
     began: bool
-
-
-def _is_slow_already(robot: RobotState, zone: Zone, speed: float) -> bool:
-    """Whether a robot will show no slow-down, because it drives slowly already.
-
-    A robot judges alerts by its own pose, too, and may report this very zone a few
-    milliseconds before it is found here; while it is still fast, its slow-down is yet
-    to be seen.
-    """
-    if robot.safety is None or robot.safety.speed_factor > HALF_SPEED:
-        return False
-    slow = HALF_SPEED * robot.profile.max_speed
-    return not _has_told(robot, zone) or speed <= slow
-
-
-def _has_told(robot: RobotState, zone: Zone) -> bool:
-    """Whether the robot already reports that it is slow for this very hazard."""
-    report = robot.safety
-    if report is None or report.speed_factor > HALF_SPEED:
-        return False
-    # A peer's own zone has no alert, and a robot may name none: that is no match.
-    ours = {zone.alert_id, zone.cause} - {None}
-    return report.decision_id in ours or report.cause in ours

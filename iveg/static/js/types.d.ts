@@ -38,16 +38,6 @@ export type Alert = {
   count: number;
 };
 
-/** From the frame that a slow-down rests on to the robot's own report (ms). */
-export type AlertLatency = {
-  p50_ms: number | null;
-  p95_ms: number | null;
-  p99_ms: number | null;
-  count: number;
-  window_s: number;
-  age_s: number | null;
-};
-
 /** Limit that the robot reports to apply. */
 export type Applied = {
   reason: string;
@@ -459,12 +449,11 @@ export type GreenhouseMap = {
   obstacles: Obstacle[];
 };
 
-/** State of the data path, counters, and reaction times of the fleet. */
+/** State of the data path, and counters. */
 export type Health = {
   ok: boolean;
   hops: HopHealth[];
   counters: Record<string, number>;
-  safety: Safety;
   /** State of the records of earlier runs. */
   earlier: "known" | "reading" | "unknown";
 };
@@ -631,15 +620,6 @@ export type Navigation = {
 export type NewToken = {
   program: ProgramToken;
   token: string;
-};
-
-/** Alerts that a robot did not answer in time, of those that it should have. */
-export type NotAcknowledged = {
-  count: number;
-  of: number;
-  within_s: number;
-  window_s: number;
-  age_s: number | null;
 };
 
 /** An obstacle. */
@@ -886,12 +866,6 @@ export type Rule = {
   foresight: boolean;
   /** How far ahead that looks (s). From 0.5 to 3. */
   foresight_s: number;
-};
-
-/** Reaction times of the fleet. */
-export type Safety = {
-  alert_latency: AlertLatency;
-  not_echoed: NotAcknowledged;
 };
 
 /** One sweep: points in ``map`` (m). */

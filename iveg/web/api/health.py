@@ -63,9 +63,6 @@ def _family(
 
 def _families(health: Health, watch: LatencyWatch, queues: Queues) -> list[Metric]:
     hops, clocks = health.hops, watch.clocks
-    latency, asked = health.safety.alert_latency, health.safety.not_echoed
-    shares = {"0.5": latency.p50_ms, "0.95": latency.p95_ms, "0.99": latency.p99_ms}
-    within = "last five minutes."
     return [
         _family(*row)
         for row in (
@@ -107,27 +104,6 @@ def _families(health: Health, watch: LatencyWatch, queues: Queues) -> list[Metri
             ),
             ("gauge", "queue_depth", "Items in the queue.", "queue", queues.depths),
             ("counter", "dropped", "Items dropped.", "queue", queues.dropped),
-            (
-                "gauge",
-                "alert_latency_seconds",
-                f"From a detection of a person to the robot's report, {within}",
-                "quantile",
-                {name: ms and ms / 1000.0 for name, ms in shares.items()},
-            ),
-            (
-                "gauge",
-                "alerts_not_echoed",
-                f"Alerts without an answer within one second, {within}",
-                "",
-                {"": asked.count},
-            ),
-            (
-                "gauge",
-                "alerts_asked",
-                f"Alerts that required an answer, {within}",
-                "",
-                {"": asked.of},
-            ),
         )
     ]
 

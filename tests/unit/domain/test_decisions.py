@@ -28,7 +28,6 @@ LOOK = Sighting("AGI", 1.0, 0.0, 0.9, START, "farmer", 0.94)
 def entry(
     *,
     speed: float = 0.8,
-    already_slow: bool = False,
     sighting: Sighting | None = LOOK,
 ) -> ZoneEntry:
     zone = Zone("person", "P1", "AGI", 1.0, 0.0, 2.0, 2.0, sighting)
@@ -43,7 +42,6 @@ def entry(
         speed_before=speed,
         in_sight=False,
         distance_m=1.43,
-        already_slow=already_slow,
     )
 
 
@@ -96,10 +94,6 @@ def test_a_report_at_full_speed_is_no_obedience() -> None:
     faster = safety_report("AGII", speed_factor=1.0)
 
     assert decision().reported(faster, at(0.1)).applied is None
-
-
-def test_what_is_reported_after_the_end_is_not_for_this_decision() -> None:
-    assert decision().closed(at(0.5)).reported(slow(), at(0.6)).applied is None
 
 
 # --- robots -----------------------------------------------------------------------
@@ -186,7 +180,7 @@ def test_what_did_not_come_in_time_is_missing_from_then_on() -> None:
 
 
 def test_what_was_open_when_iveg_went_away_is_unknown_and_says_when() -> None:
-    broken = decision().published(at(0.01)).broken_off(at(0.5))
+    broken = decision().published(at(0.01)).closed(at(0.5), interrupted=True)
 
     assert verdicts(broken, 99.0)["feedback"] == "ok"
     assert broken.links()[-1].at == at(0.5).wall

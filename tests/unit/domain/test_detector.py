@@ -4,14 +4,13 @@ import pytest
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import (
-    CLASS_NAMES,
     FRAMES_HZ,
     DetectorEvidence,
     OutOfService,
     flaw_of,
 )
 from iveg.domain.observations import DetectionFrame, Origin
-from tests.builders import at, detection, detection_frame
+from tests.builders import at
 
 OUT = OutOfService("maria", 1.0, "boot-a")
 
@@ -82,25 +81,6 @@ def test_an_unread_box_that_may_be_of_a_person_or_robot_is_a_flaw(
 
 def test_a_tomato_without_depth_is_none() -> None:
     assert flaw_of(frame("tomato"), DetectionRule()) is None
-
-
-def seen(*class_ids: str) -> DetectionFrame:
-    return detection_frame("AGI", *map(detection, class_ids))
-
-
-def names(frame: DetectionFrame) -> list[str]:
-    return [one.class_id for one in frame.detections]
-
-
-def test_two_hundred_classes_of_a_robot_have_a_name_and_no_more() -> None:
-    detector, rule = DetectorEvidence(), DetectionRule()
-    for number in range(CLASS_NAMES):
-        detector.bounded(seen(f"thing-{number}"), rule)
-
-    found = detector.bounded(seen("thing-7", "news", "farmer", "Husky"), rule)
-
-    assert names(found) == ["thing-7", "other", "farmer", "Husky"]
-    assert len(detector.class_names) == CLASS_NAMES
 
 
 def test_a_frame_with_somebody_whose_place_nobody_knows_is_not_whole() -> None:

@@ -5,7 +5,6 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.detector import CLASS_NAMES
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.margins import LeastMargins
@@ -313,6 +312,16 @@ def test_a_long_sighting_is_one_line_and_two_rows_a_second() -> None:
     assert len(desk.records(DetectionRecord)) == 10
 
 
+def test_boxes_of_ever_new_things_are_one_line_and_two_rows_a_second() -> None:
+    desk = watched(Desk())
+    for number in range(50):
+        desk.clock.now = round(desk.clock.now + 0.1, 6)
+        desk.look("AGII", *(detection(f"thing-{number}-{n}", 80.0) for n in range(9)))
+
+    assert desk.sentences().count("log.detection_unmapped") == 1
+    assert len(desk.records(DetectionRecord)) == 10
+
+
 @pytest.mark.parametrize(
     ("class_id", "probability", "key"),
     [("farmer", 0.6, "log.detection_faint"), ("crate", 0.9, "log.detection_unmapped")],
@@ -325,15 +334,6 @@ def test_faint_and_unmapped_detections_are_never_silently_ignored(
     desk.look("AGII", detection(class_id, 80.0, probability=probability))
 
     assert desk.sentences()[-1] == key
-
-
-async def test_a_person_who_is_not_seen_any_more_is_remembered_then_expired() -> None:
-    desk = watched(Desk())
-    meet(desk, 80.0)
-    await desk.wait(11.0)
-
-    told = [key for key in desk.sentences() if key.startswith("log.person")]
-    assert told == ["log.person_remembered", "log.person_expired"]
 
 
 async def test_a_spot_that_was_looked_at_in_vain_is_told() -> None:
@@ -376,15 +376,6 @@ def test_a_possible_person_is_told_as_such_where_the_rule_counts_them() -> None:
     told = [line.slots[name] for name in ("looks", "least", "most", "over")]
     assert told == [2, 0.68, 0.7, 0.3]
     assert line.slots["probability"] == 0.8322
-
-
-def test_looks_at_ever_new_things_do_not_fill_the_memory() -> None:
-    desk = watched(Desk())
-    for number in range(5):
-        things = [detection(f"thing-{number}-{n}", 80.0) for n in range(220)]
-        desk.look("AGII", *things)
-
-    assert desk.evaluator.tracking.subjects == CLASS_NAMES + 1
 
 
 def test_28_6_a_pose_is_kept_with_its_margin_while_that_is_measured() -> None:

@@ -23,7 +23,6 @@
  * @typedef {import("../types.js").Rule} Rule
  * @typedef {import("../types.js").LogEntry} Entry
  * @typedef {Aged & import("../types.js").Health} Health
- * @typedef {import("../types.js").Safety} Safety
  * @typedef {Aged & import("../types.js").Climate} Climate
  * @typedef {Aged & import("../types.js").Tile} Tile
  * @typedef {import("../types.js").GreenhouseMap} GreenhouseMap

@@ -17,7 +17,6 @@ import {
 import { readingsOf } from "../panels/readings.js";
 import { isHeard, taskSaid } from "../panels/robot_texts.js";
 import { heardOf, judgeDataPath } from "./health_sentence.js";
-import { createTiles } from "./tiles.js";
 
 /** @typedef {import("../core/protocol.js").Robot} Robot */
 /** @typedef {import("../core/i18n.js").I18n} I18n */
@@ -109,7 +108,6 @@ export function start(page) {
   store.subscribe("snapshot", load);
   draw();
   load();
-  createTiles(page);
 }
 
 /**

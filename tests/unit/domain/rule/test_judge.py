@@ -320,35 +320,6 @@ def test_a_live_robot_whose_task_is_called_replay_keeps_its_protection() -> None
     assert {one.robot_id for one in scene.world.live_robots()} == {"AGI", "AGII"}
 
 
-# --- a robot that is slow already -------------------------------------------------
-
-
-def test_a_robot_that_is_slow_for_another_reason_will_show_no_slow_down() -> None:
-    scene = watching(Scene())
-    scene.report("AGI", factor=0.5, decision_id="another")
-    scene.look("AGII", person(1.5))
-    scene.judge()
-
-    (change,) = scene.changes
-    assert change.entry.already_slow
-
-
-@pytest.mark.parametrize(("speed", "already_slow"), [(0.8, False), (0.4, True)])
-def test_a_robot_that_judged_this_very_alert_first_and_is_fast_is_still_to_slow_down(
-    speed: float, already_slow: bool
-) -> None:
-    scene = watching(Scene())
-    scene.drive("AGI", 0.0, linear=speed)
-    scene.look("AGII", person(1.5))
-    (somebody,) = scene.everyone
-    scene.report("AGI", factor=0.5, decision_id=somebody.decision_id)
-    scene.judge()
-
-    (change,) = scene.changes
-    assert change.entry.already_slow is already_slow
-    assert change.entry.told_before
-
-
 def test_a_peer_whose_pose_goes_on_slows_others_whatever_its_twist_says() -> None:
     scene = Scene(rule=RINGS)
     for number in range(12):
