@@ -357,12 +357,6 @@ MUTANTS = (
         ("unit/vital/test_frames.py",),
     ),
     Mutant(
-        "rule: the second place of a box is counted as somebody else",
-        "first.setdefault(out[index].index, number),",
-        "number,",
-        ("unit/domain/tracking/test_frames.py",),
-    ),
-    Mutant(
         "clear: a robot may be at any place outside",
         "if bounds is not None and not bounds.contains(pose.x, pose.y):",
         "if False:",

@@ -209,16 +209,14 @@ class People:
             for index, one in enumerate(out)
             if one.kind == "alert" and one.peer is None
         ]
-        first: dict[int, int] = {}
         tracks = self._tracker.track_picture(
             [
                 PlacedDetection(
                     out[index].class_ or "person",
                     _sighting(out[index], observer, at),
                     f"{new_id}-{index}",
-                    first.setdefault(out[index].index, number),
                 )
-                for number, index in enumerate(wanting)
+                for index in wanting
             ],
             at,
         )
@@ -240,7 +238,7 @@ class People:
             return None
         name, x, y = report.robot_id, found.x, found.y
         seen = Sighting(name, x, y, _HEIGHT_M, at, LASER, EVEN, None, laser=True)
-        picture = [PlacedDetection("person", seen, f"{new_id}-0", 0)]
+        picture = [PlacedDetection("person", seen, f"{new_id}-0")]
         (track,) = self._tracker.track_picture(picture, at)
         return None if track is None else self.known[track]
 

@@ -21,34 +21,6 @@ from iveg.domain.observations import Instant
 from iveg.domain.parameters import Class
 from iveg.domain.tracking.looks import Looks
 
-
-@dataclass(frozen=True, slots=True)
-class Extent:
-    """Places, confidence and speed of some sightings.
-
-    Extents are only ever joined: no sighting of a track forgets what another one knew.
-
-    Attributes:
-        around: The box in ``map`` that holds every place of theirs.
-        surest: Greatest confidence (0 to 1).
-        fastest: Greatest speed (m/s).
-    """
-
-    around: Rectangle
-    surest: float
-    fastest: float = 0.0
-
-    def joined(self, other: "Extent | None") -> "Extent":
-        """The extent of both."""
-        if other is None:
-            return self
-        return Extent(
-            self.around.joined(other.around),
-            max(self.surest, other.surest),
-            max(self.fastest, other.fastest),
-        )
-
-
 _SMOOTHED_S = 0.4
 MISTAKEN_S = 2.5
 """Longest mistake of a detector; most of them last 2 s."""
@@ -68,14 +40,11 @@ class Sighting:
             counts that is too faint to be a look.
         reach_m: Where the position is doubtful, x and y are the observer's own, and
             this is how far its camera reaches (m); else 0.
-        chain: Number of the chain of sightings whose newest this is; negative: of the
-            second place of a box that may be in two (``iveg.domain.frames``).
+        chain: Number of the chain of sightings whose newest this is.
         recording: The map frame of the recording that saw it; None: a robot of today.
         vx: How its chain goes in ``map`` (m/s); ``vy`` likewise.
         possible: Whether it counts by its looks alone, below the threshold.
         laser: Only the observer's laser saw it: it moves like somebody who walks.
-        extent: Of its chain, and of all that this was ever taken to continue; None
-            before it is part of a chain.
         beyond_m: How much farther its box reaches than a person does (m); the zone is
             as much wider.
     """
@@ -95,7 +64,6 @@ class Sighting:
     vy: float = 0.0
     possible: bool = False
     laser: bool = False
-    extent: Extent | None = None
     beyond_m: float = 0.0
 
     @property
@@ -119,19 +87,7 @@ class Sighting:
     def in_chain(self, chain: int, before: "Sighting | None" = None) -> "Sighting":
         """This sighting as the newest of a chain, after the one ``before``."""
         vx, vy = (0.0, 0.0) if before is None else self._going_on(before)
-        x, y = self.x, self.y
-        extent = Extent(Rectangle(x, y, x, y), self.confidence, math.hypot(vx, vy))
-        if before is not None:
-            extent = extent.joined(before.extent)
-        return replace(self, chain=chain, vx=vx, vy=vy, extent=extent)
-
-    def in_track(self, person: "TrackedPerson") -> "Sighting":
-        """This sighting as the begin of a chain in a track that is known."""
-        extent = self.extent
-        if extent is not None:
-            for earlier in (person.newest, *person.sightings):
-                extent = extent.joined(earlier.extent)
-        return replace(self, extent=extent)
+        return replace(self, chain=chain, vx=vx, vy=vy)
 
     def _going_on(self, before: "Sighting") -> tuple[float, float]:
         """The velocity of the chain (m/s), smoothed over 0.4 s, of a walker at most."""
@@ -146,12 +102,43 @@ class Sighting:
 
 
 @dataclass(frozen=True, slots=True)
+class Extent:
+    """Places, confidence and speed of all sightings that a track ever had.
+
+    Attributes:
+        around: The box in ``map`` that holds every place of theirs.
+        surest: Greatest confidence (0 to 1).
+        fastest: Greatest speed (m/s).
+    """
+
+    around: Rectangle
+    surest: float
+    fastest: float
+
+    @classmethod
+    def of(cls, sighting: Sighting) -> "Extent":
+        """The extent of one sighting."""
+        x, y = sighting.x, sighting.y
+        speed = math.hypot(sighting.vx, sighting.vy)
+        return cls(Rectangle(x, y, x, y), sighting.confidence, speed)
+
+    def joined(self, other: "Extent") -> "Extent":
+        """The extent of both."""
+        return Extent(
+            self.around.joined(other.around),
+            max(self.surest, other.surest),
+            max(self.fastest, other.fastest),
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class TrackedPerson:
     """A person, or a robot that does not belong to the fleet, with all sightings.
 
     Attributes:
         person_id: Of the track: the same person as long as iVeg can tell.
         sightings: The newest of each chain of sightings; each has a zone of its own.
+        extent: Of every sighting since the first.
     """
 
     person_id: str
@@ -160,6 +147,7 @@ class TrackedPerson:
     first_seen: Instant
     newest: Sighting
     sightings: tuple[Sighting, ...]
+    extent: Extent
 
     def age_s(self, now: Instant) -> float:
         """Seconds since the newest sighting by any robot."""
@@ -173,10 +161,7 @@ class TrackedPerson:
     @property
     def middle(self) -> tuple[float, float]:
         """Middle of the places where they have been, in ``map`` (m)."""
-        extent = self.newest.extent
-        if extent is None:
-            return self.newest.x, self.newest.y
-        return extent.around.middle
+        return self.extent.around.middle
 
     @property
     def is_possible(self) -> bool:
@@ -233,10 +218,10 @@ class Thing:
     """One word of an operator: "not a person here".
 
     A thing is a place, half a metre around it, until the end of the day at the latest.
-    It takes the zones of a track if all its sightings, and all that these were ever
-    taken to continue, are of the thing: within half a metre from the first on, slower
-    than a walker, less sure than 0.95.  A person who walks in, moves or is surely seen
-    is protected as without it (docs/safety.md, "Not a person here").
+    It takes the zones of a track if all sightings that it ever had are of the thing:
+    within half a metre from the first on, slower than a walker, less sure than 0.95.  A
+    person who walks in, moves or is surely seen is protected as without it
+    (docs/safety.md, "Not a person here").
 
     Attributes:
         x: Of its middle in ``map`` (m); ``y`` likewise.
@@ -256,19 +241,16 @@ class Thing:
 
     def explains(self, person: TrackedPerson) -> bool:
         """Whether a track is nothing but this thing."""
-        seen = (person.newest, *person.sightings)
-        return person.class_ == "person" and all(map(self._explains, seen))
-
-    def _explains(self, sighting: Sighting) -> bool:
-        extent = sighting.extent
+        extent = person.extent
         return (
-            extent is not None
-            and sighting.recording is None
-            and not sighting.reach_m
-            and not sighting.laser
+            person.class_ == "person"
             and extent.surest < SURELY_FROM
             and extent.fastest < MOVES_FROM_M_S
             and extent.around.farthest_m(self.x, self.y) <= RADIUS_M
+            and not any(
+                one.recording or one.reach_m or one.laser
+                for one in (person.newest, *person.sightings)
+            )
         )
 
 

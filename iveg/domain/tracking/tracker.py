@@ -8,12 +8,11 @@ time or its own camera ends a chain's zone.  Tracks play no part in it.
 
 *Tracks* (names).  A chain that goes on keeps its track.  One that begins joins the
 nearest live track (global assignment over the whole picture), else it begins a track: a
-person who comes back after a gap has a new number.  Live tracks closer than half a
-metre become one.  Two that were ever seen apart at once never do.
+person who comes back after a gap has a new number.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.parameters import Class
-from iveg.domain.tracking.person import Sighting, TrackedPerson
+from iveg.domain.tracking.person import Extent, Sighting, TrackedPerson
 
 _DAY_S = 86400.0
 
@@ -120,14 +119,11 @@ class PlacedDetection:
 
     Attributes:
         decision_id: Of the alert, should this begin a track.
-        first: Index in the picture of the first place of the same box, mostly its own.
-            Every further place joins the track of the first.
     """
 
     class_: Class
     sighting: Sighting
     decision_id: str
-    first: int
 
 
 _Chain = tuple[str, Sighting]
@@ -203,9 +199,6 @@ def _is_replaced(earlier: Sighting, sighting: Sighting, at: Instant) -> bool:
 MAX_PEOPLE, MAX_POSSIBLE, MAX_WALKERS = 256, 64, 8
 """People who count by looks, and whom only lasers saw, take no place of others; of the
 last each robot has its own places, so that none takes another's."""
-MERGE_M = 0.5
-_APART_M = 3.0
-"""Farther from each other, at once, are two: beyond noise and a second's walk."""
 
 
 @dataclass
@@ -213,15 +206,12 @@ class Tracker:
     """Every known person by id, in the order of appearance.
 
     Attributes:
-        merge_m: Live tracks this near become one (m); below zero none do.
         numbers: Gives out ids.
     """
 
-    merge_m: float = MERGE_M
     numbers: TrackNumbers = field(default_factory=TrackNumbers)
     known: dict[str, TrackedPerson] = field(default_factory=dict)
     _chains: int = 0
-    _together: dict[str, set[str]] = field(default_factory=dict)
 
     def track_picture(
         self, picture: Sequence[PlacedDetection], at: Instant
@@ -232,17 +222,13 @@ class Tracker:
             The track of each detection; None where no more can be kept.
         """
         chains = self._continued_chains(picture, at)
-        tracks = self._tracks_of(picture, chains, at)
-        numbers: list[int] = []
-        for index, (one, old) in enumerate(zip(picture, chains, strict=True)):
-            # The chain of a further place has its first one's number, negative.
-            is_first = one.first == index
-            numbers.append(self._number_of(old) if is_first else -numbers[one.first])
-            tracks[index] = self._put(one, numbers[index], old, tracks[one.first], at)
-        named = [track for track in tracks if track is not None]
-        self._remember_together(named)
-        merged = dict(self._merge(dict.fromkeys(named), at))
-        return [_name_now(track, merged) for track in tracks]
+        tracks = self._joined_tracks(picture, chains, at)
+        return [
+            self._continue(one, *chains[index], at)
+            if index in chains
+            else self._join(one, tracks.get(index), at)
+            for index, one in enumerate(picture)
+        ]
 
     def drop(self, person_id: str, sighting: Sighting) -> TrackedPerson:
         """Drop a sighting whose place its own camera saw to be empty."""
@@ -255,27 +241,27 @@ class Tracker:
         """Drop persons whose mark has had its time; returns them."""
         gone = [one for one in self.known.values() if one.stage(now) == "gone"]
         for person in gone:
-            self._remove(person.person_id)
+            del self.known[person.person_id]
         return gone
 
     def _continued_chains(
         self, picture: Sequence[PlacedDetection], at: Instant
-    ) -> list[_Chain | None]:
-        """For each detection the earlier sighting that it replaces, and its track."""
-        out: list[_Chain | None] = [None] * len(picture)
-        if not picture:
-            return out
-        observer = picture[0].sighting.observer
+    ) -> dict[int, _Chain]:
+        """The earlier sighting that a detection replaces, and its track, by index.
+
+        Whoever is in sight goes before whoever is only remembered.
+        """
         own = [
             (person, earlier)
             for person in self.known.values()
             for earlier in person.sightings
-            if earlier.observer == observer
-            and earlier.chain > 0
+            if picture
+            and earlier.observer == picture[0].sighting.observer
             and earlier.age_s(at) <= LIMITS.zone_lasts_s
         ]
+        chains: dict[int, _Chain] = {}
         for is_live in (True, False):
-            wanting = _without(picture, out)
+            wanting = _without(picture, chains)
             offered = [
                 (person, earlier)
                 for person, earlier in own
@@ -287,40 +273,19 @@ class Tracker:
             ]
             for row, column in assign(costs):
                 person, earlier = offered[column]
-                out[wanting[row]] = person.person_id, earlier
-        return [
-            old if one.first == index else self._beside(out[one.first])
-            for index, (one, old) in enumerate(zip(picture, out, strict=True))
-        ]
+                chains[wanting[row]] = person.person_id, earlier
+        return chains
 
-    def _beside(self, first: _Chain | None) -> _Chain | None:
-        """The sighting that a further place replaces: beside that of its first."""
-        if first is None:
-            return None
-        track, replaced = first
-        for earlier in self.known[track].sightings:
-            if earlier.chain == -replaced.chain:
-                return track, earlier
-        return None
-
-    def _number_of(self, old: _Chain | None) -> int:
-        """Number of the chain that goes on, or of a new one."""
-        if old is not None:
-            return old[1].chain
-        self._chains += 1
-        return self._chains
-
-    def _tracks_of(
+    def _joined_tracks(
         self,
         picture: Sequence[PlacedDetection],
-        chains: Sequence[_Chain | None],
+        chains: Mapping[int, _Chain],
         at: Instant,
-    ) -> list[str | None]:
-        """The track of each chain that goes on; a new one is offered the live ones."""
-        tracks = [None if old is None else old[0] for old in chains]
-        wanting = _without(picture, tracks)
-        taken = set(tracks)
-        offered = [
+    ) -> dict[int, str]:
+        """Live tracks that the other detections of a picture join, by index."""
+        taken = {track for track, _ in chains.values()}
+        wanting = _without(picture, chains)
+        live = [
             person
             for person in self.known.values()
             if wanting
@@ -328,33 +293,33 @@ class Tracker:
             and person.age_s(at) <= LIMITS.seen_s
         ]
         costs = [
-            [_live_cost(picture[i], person, at) for person in offered] for i in wanting
+            [_live_cost(picture[i], person, at) for person in live] for i in wanting
         ]
-        for row, column in assign(costs):
-            tracks[wanting[row]] = offered[column].person_id
-        return tracks
+        return {wanting[row]: live[column].person_id for row, column in assign(costs)}
 
-    def _put(
-        self,
-        one: PlacedDetection,
-        chain: int,
-        old: _Chain | None,
-        track: str | None,
-        at: Instant,
-    ) -> str | None:
-        """Keep a sighting in its track; its chain's earlier one is removed."""
-        sighting = one.sighting.in_chain(chain, None if old is None else old[1])
-        if old is not None:
-            if old[1].at.mono > sighting.at.mono:
-                return old[0]
-            self.drop(*old)
+    def _continue(
+        self, one: PlacedDetection, track: str, earlier: Sighting, at: Instant
+    ) -> str:
+        """Replace the earlier sighting of a chain, unless this one is older."""
+        if earlier.at.mono <= one.sighting.at.mono:
+            self.drop(track, earlier)
+            self._add(one, track, one.sighting.in_chain(earlier.chain, earlier), at)
+        return track
+
+    def _join(self, one: PlacedDetection, track: str | None, at: Instant) -> str | None:
+        """Begin a chain in a track, or in one of its own."""
+        self._chains += 1
+        sighting = one.sighting.in_chain(self._chains)
         if track is None:
             return self._begin(one, sighting, at)
+        self._add(one, track, sighting, at)
+        return track
+
+    def _add(
+        self, one: PlacedDetection, track: str, sighting: Sighting, at: Instant
+    ) -> None:
+        """Add the newest sighting of a chain to its track."""
         person = self.known[track]
-        if person.age_s(at) > LIMITS.seen_s:
-            self._remember_apart(track, sighting, at)
-        if old is None or old[0] != track:
-            sighting = sighting.in_track(person)
         kept = tuple(
             earlier
             for earlier in person.sightings
@@ -371,8 +336,8 @@ class Tracker:
             newest=sighting if later else person.newest,
             sightings=(*kept, sighting),
             decision_id=person.decision_id if had_zone else one.decision_id,
+            extent=person.extent.joined(Extent.of(sighting)),
         )
-        return track
 
     def _begin(
         self, one: PlacedDetection, sighting: Sighting, at: Instant
@@ -383,9 +348,14 @@ class Tracker:
         kind = "P" if one.class_ == "person" else "R"
         track = self.numbers.next_id(kind, at, self.known)
         self.known[track] = TrackedPerson(
-            track, one.class_, one.decision_id, at, sighting, (sighting,)
+            track,
+            one.class_,
+            one.decision_id,
+            at,
+            sighting,
+            (sighting,),
+            Extent.of(sighting),
         )
-        self._remember_apart(track, sighting, at)
         return track
 
     def _end_marks(self, one: PlacedDetection, here: Sighting, at: Instant) -> None:
@@ -395,7 +365,7 @@ class Tracker:
             is_mark = person.stage(at) == "last_seen" and _is_alike(person, one)
             is_placed = not (last.reach_m or here.reach_m)
             if is_mark and is_placed and _distance(last, here) <= GATE_M:
-                self._remove(person.person_id)
+                del self.known[person.person_id]
 
     def _has_room(self, now: Instant, newest: Sighting) -> bool:
         """Whether one more can be kept, if need be in place of one without a zone.
@@ -419,87 +389,11 @@ class Tracker:
         """Remove the first of them that has no zone; whether there was one."""
         for person in people:
             if person.stage(now) in ("last_seen", "gone"):
-                self._remove(person.person_id)
+                del self.known[person.person_id]
                 return True
         return False
 
-    def _remove(self, track: str) -> None:
-        del self.known[track]
-        for other in self._together.pop(track, ()):
-            self._together[other].discard(track)
 
-    # --- one person under two names -----------------------------------------------
-
-    def _remember_together(self, tracks: Iterable[str]) -> None:
-        """Remember that one picture showed all of these: they never merge."""
-        shown = set(tracks)
-        for track in shown:
-            self._together.setdefault(track, set()).update(shown - {track})
-
-    def _remember_apart(self, track: str, here: Sighting, at: Instant) -> None:
-        """Remember who is in sight elsewhere as this one appears: they never merge."""
-        for other in self.known.values():
-            seen = other.newest
-            if (
-                other.age_s(at) <= LIMITS.seen_s
-                and other.person_id != track
-                and not (seen.reach_m or here.reach_m)
-                and seen.recording == here.recording
-                and _distance(seen, here) > _APART_M
-            ):
-                self._remember_together((track, other.person_id))
-
-    def _merge(self, touched: Iterable[str], at: Instant) -> Iterator[tuple[str, str]]:
-        """Join live tracks that stand at one spot; yields the changed names."""
-        for track in touched:
-            while track in self.known and (twin := self._twin_of(track, at)):
-                first, second = sorted((track, twin), key=[*self.known].index)
-                self._join(first, second)
-                yield second, first
-
-    def _twin_of(self, track: str, at: Instant) -> str | None:
-        person, apart = self.known[track], self._together.get(track, set())
-        here = person.newest
-        for other in self.known.values():
-            newest = other.newest
-            if (
-                # First what nearly all fail: in a storm this looks at everybody.
-                abs(newest.x - here.x) <= self.merge_m
-                and _distance(newest, here) <= self.merge_m
-                and other is not person
-                and other.class_ == person.class_
-                and newest.recording == here.recording
-                and other.person_id not in apart
-                and other.age_s(at) <= LIMITS.seen_s
-                and not (newest.reach_m or here.reach_m)
-            ):
-                return other.person_id
-        return None
-
-    def _join(self, first: str, second: str) -> None:
-        """Every sighting of both is kept: names change, zones do not."""
-        older, younger = self.known[first], self.known[second]
-        # What one of them knows of how far and fast they went, both know.
-        found = [one.in_track(older) for one in (younger.newest, *younger.sightings)]
-        newest = max(older.newest, found[0], key=lambda sighting: sighting.at.mono)
-        sightings = (*older.sightings, *found[1:])
-        self.known[first] = replace(older, newest=newest, sightings=sightings)
-        apart = self._together.get(second, set()) - {first}
-        self._remove(second)
-        for other in apart:
-            self._remember_together((first, other))
-
-
-def _without(picture: Sequence[PlacedDetection], found: Sequence[object]) -> list[int]:
-    """Indices of the boxes' first places for which nothing was found."""
-    return [
-        index
-        for index, one in enumerate(picture)
-        if one.first == index and found[index] is None
-    ]
-
-
-def _name_now(track: str | None, merged: Mapping[str, str]) -> str | None:
-    while track is not None and track in merged:
-        track = merged[track]
-    return track
+def _without(picture: Sequence[PlacedDetection], found: Container[int]) -> list[int]:
+    """Indices of the detections for which nothing was found."""
+    return [index for index in range(len(picture)) if index not in found]
