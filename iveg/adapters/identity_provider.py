@@ -8,16 +8,20 @@ the pages "OAuth" and "OIDC" of Keyrock's documentation (repository ging/fiware-
 
 import secrets
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 from urllib.parse import urlencode, urlsplit
+
+import orjson
+from cryptography.fernet import Fernet, InvalidToken
 
 from iveg.adapters.bounded_json import BoundedJson
 from iveg.domain.errors import SignOnError
 from iveg.domain.records import Json
 
 HOP: Final = "sso"
+WAITS_S: Final = 600
+"""Life of an attempt (s)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,26 +49,42 @@ class Attempt:
 
     Attributes:
         back: Where the provider sends the browser (``redirect_uri``).
+        to: Path of iVeg at which the person goes on.
         state, nonce, verifier: Tie answer, ID token and code to it.
     """
 
     back: str
+    to: str = "/"
     state: str = field(default_factory=_random, repr=False)
     nonce: str = field(default_factory=_random, repr=False)
     verifier: str = field(default_factory=_random, repr=False)
 
 
+class SealedAttempts:
+    """Attempts as cookies keep them: sealed by a key that ends with the process."""
+
+    def __init__(self) -> None:
+        self._seal = Fernet(Fernet.generate_key())
+
+    def seal(self, attempt: Attempt, now: float) -> str:
+        """An attempt as a text that nobody else can read or make (``now`` Unix s)."""
+        return self._seal.encrypt_at_time(orjson.dumps(attempt), int(now)).decode()
+
+    def open(self, sealed: str, now: float) -> Attempt | None:
+        """The attempt in a text; None where it is over, or no such text."""
+        try:
+            kept = self._seal.decrypt_at_time(sealed.encode(), WAITS_S, int(now))
+        except InvalidToken:
+            return None
+        return Attempt(**orjson.loads(kept))
+
+
 @dataclass(frozen=True, slots=True)
 class Vouched:
-    """Statement of a provider about a person.
-
-    Attributes:
-        id_token: For the sign-out there; empty: none.
-    """
+    """Statement of a provider about a person."""
 
     subject: str
     claims: Json
-    id_token: str = field(default="", repr=False)
 
 
 class IdentityProvider(ABC):
@@ -82,10 +102,6 @@ class IdentityProvider(ABC):
     async def vouch(self, attempt: Attempt, code: str) -> Vouched:
         """Exchange the code of an attempt. Raises SignOnError: it proves nothing."""
 
-    async def sign_out_address(self, _back: str, _id_token: str, /) -> str | None:
-        """Where a browser goes to sign out there, too; None: not offered."""
-        return None
-
     async def close(self) -> None:
         """Close connections."""
         await self._http.close()
@@ -99,7 +115,7 @@ class IdentityProvider(ABC):
             "state": attempt.state,
             **more,
         }
-        return with_query(url, query)
+        return f"{url}{'&' if urlsplit(url).query else '?'}{urlencode(query)}"
 
     async def _redeem(self, url: str, attempt: Attempt, code: str) -> Json:
         """Exchange a code at the token endpoint (RFC 6749, 4.1.3; RFC 7636, 4.5)."""
@@ -121,7 +137,7 @@ class IdentityProvider(ABC):
 
 
 class Keyrock(IdentityProvider):
-    """FIWARE Keyrock, by OAuth 2.0 and its own ``/user``; nobody signs out there."""
+    """FIWARE Keyrock, by OAuth 2.0 and its own ``/user``."""
 
     async def address(self, attempt: Attempt) -> str:
         """Where a browser goes to sign in."""
@@ -146,8 +162,3 @@ def text_of(answer: Json, name: str) -> str:
     if not isinstance(value, str) or not value:
         raise SignOnError("untrusted", f"no {name} was told")
     return value
-
-
-def with_query(url: str, query: Mapping[str, str]) -> str:
-    """An address with more parameters."""
-    return f"{url}{'&' if urlsplit(url).query else '?'}{urlencode(query)}"

@@ -2,10 +2,9 @@
 
 The only importer of authlib and of joserfc, which comes with it (extra ``sso``).
 Authlib's Starlette client is not used: it wants httpx2 and sessions in signed cookies.
-Sources: OpenID Connect Core 1.0, 3.1; Discovery 1.0; RP-Initiated Logout 1.0; RFC 7636.
+Sources: OpenID Connect Core 1.0, 3.1; Discovery 1.0; RFC 7636.
 """
 
-from collections.abc import Callable
 from typing import Any, Final
 
 from authlib.oauth2.rfc7636 import create_s256_code_challenge
@@ -18,14 +17,11 @@ from joserfc.jwk import KeySet
 from iveg.adapters.identity_provider import (
     HOP,
     Attempt,
-    Client,
     IdentityProvider,
     Vouched,
     text_of,
-    with_query,
 )
 from iveg.domain.errors import HopError, SignOnError
-from iveg.domain.observations import Instant
 from iveg.domain.records import Json
 from iveg.setting_types import is_safe_address
 
@@ -35,31 +31,23 @@ ALGORITHMS: Final = tuple(
 """Signatures that count: of nobody else's making, so neither ``none`` nor ``HS256``."""
 LEEWAY_S: Final = 30
 """Greatest error of the provider's clock (s)."""
-_KNOWN_S: Final = 3600.0
-_NEEDED: Final = ("authorization_endpoint", "token_endpoint", "jwks_uri")
-_OPTIONAL: Final = ("userinfo_endpoint", "end_session_endpoint")
+_ENDPOINTS: Final = ("authorization_endpoint", "token_endpoint", "jwks_uri")
 
 
 class OpenIdProvider(IdentityProvider):
-    """A provider that says by discovery where everything is.
-
-    Args:
-        client: iVeg, as the provider knows it.
-        clock: Read at each question.
-    """
-
-    def __init__(self, client: Client, clock: Callable[[], Instant]) -> None:
-        super().__init__(client)
-        self._clock = clock
-        self._about: Json = {}
-        self._known_at = -_KNOWN_S
+    """A provider that says by discovery where everything is."""
 
     async def address(self, attempt: Attempt) -> str:
-        """Where a browser goes to sign in."""
+        """Where a browser goes to sign in, anew each time.
+
+        Tablets are shared: after a sign-out of iVeg nobody comes in by a session that
+        the provider still has in this browser.
+        """
         return self._code_address(
             (await self._discover())["authorization_endpoint"],
             attempt,
             scope=self.client.scopes,
+            prompt="login",
             nonce=attempt.nonce,
             code_challenge=create_s256_code_challenge(attempt.verifier),
             code_challenge_method="S256",
@@ -80,35 +68,19 @@ class OpenIdProvider(IdentityProvider):
             if info.is_success and info.body.get("sub") == claims["sub"]:
                 user = info.body
         # What is signed comes last, and wins.
-        return Vouched(text_of(claims, "sub"), {**user, **claims}, token)
-
-    async def sign_out_address(self, back: str, id_token: str, /) -> str | None:
-        """Where a browser goes to sign out there, too; None: not offered."""
-        url = (await self._discover()).get("end_session_endpoint")
-        if url is None:
-            return None
-        query = {"client_id": self.client.client_id, "post_logout_redirect_uri": back}
-        if id_token:
-            query["id_token_hint"] = id_token
-        return with_query(url, query)
+        return Vouched(text_of(claims, "sub"), {**user, **claims})
 
     async def _discover(self) -> Json:
-        """Where everything is; asked for once an hour."""
-        now = self._clock().mono
-        if now - self._known_at >= _KNOWN_S:
-            answer = await self._http.get(
-                get_well_known_url(self.client.issuer, external=True)
-            )
-            if not answer.is_success:
-                raise HopError(HOP, f"{answer.status} to its own description")
-            self._about, self._known_at = self._checked(answer.body), now
-        return self._about
-
-    def _checked(self, about: Json) -> Json:
-        """A description whose addresses may be used. Raises HopError."""
+        """The provider's description, whose addresses may be used. Raises HopError."""
+        answer = await self._http.get(
+            get_well_known_url(self.client.issuer, external=True)
+        )
+        about = answer.body
+        if not answer.is_success:
+            raise HopError(HOP, f"{answer.status} to its own description")
         if about.get("issuer") != self.client.issuer:
             raise HopError(HOP, "says that it is another issuer")
-        for name in (*_NEEDED, *(name for name in _OPTIONAL if name in about)):
+        for name in {*_ENDPOINTS, *about.keys() & {"userinfo_endpoint"}}:
             address = about.get(name)
             if not isinstance(address, str) or not is_safe_address(address):
                 raise HopError(HOP, f"its {name} cannot be used")
@@ -126,7 +98,7 @@ class OpenIdProvider(IdentityProvider):
             known = KeySet.import_key_set(keys)  # type: ignore[arg-type]
             read = jwt.decode(token, known, algorithms=ALGORITHMS)
             claims = CodeIDToken(read.claims, read.header, required, expected)
-            claims.validate(int(self._clock().wall), LEEWAY_S)
+            claims.validate(leeway=LEEWAY_S)
         except (JoseError, ValueError, TypeError, KeyError) as error:
             why = type(error).__name__
             raise SignOnError("untrusted", f"ID token: {why}") from error

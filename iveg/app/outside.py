@@ -193,7 +193,7 @@ def open_provider(settings: Settings) -> IdentityProvider | None:
     # Only here: without the extra the module cannot be imported.
     from iveg.adapters.oidc import OpenIdProvider
 
-    return OpenIdProvider(client, clock.now)
+    return OpenIdProvider(client)
 
 
 def open_fiware(settings: Settings) -> tuple[OrionClient, IotAgentClient]:

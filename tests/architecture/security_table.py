@@ -26,8 +26,7 @@ _BY_ITSELF = "`sign_in`, `sign_in_refused`"
 _API = "/api/v1"
 _WRONG = "wrong ones as at sign-in"
 _LIMITS = {
-    "POST /signin": "20 a second; of an address five wrong, then one a minute; "
-    "of an account a wait of 10 s at most",
+    "POST /signin": "20 a second; of an address five wrong, then one a minute",
     f"POST {_API}/robots/{{robot_id}}/release": "the holds that were seen",
     f"POST {_API}/robots/{{robot_id}}/goal": "one of a robot, the newest",
     f"PUT {_API}/rule": "upon the version that was seen",

@@ -126,7 +126,6 @@ class FakeIdentityProvider:
                 Route("/oauth2/token", self._token, methods=["POST"]),
                 Route("/userinfo", self._user_info),
                 Route("/user", self._keyrock_user),
-                Route("/out", self._out),
             ]
         )
 
@@ -157,14 +156,11 @@ class FakeIdentityProvider:
             "token_endpoint": f"{self.url}/token",
             "jwks_uri": f"{self.url}/keys",
             "userinfo_endpoint": f"{self.url}/userinfo",
-            "end_session_endpoint": f"{self.url}/out",
         }
         if self.vice == "wrong_issuer":
             about["issuer"] = "https://somebody-else.test"
         if self.vice == "plain_http":
             about["token_endpoint"] = "http://169.254.169.254/latest"
-        if self.vice == "no_sign_out":
-            del about["end_session_endpoint"]
         return JSONResponse(about)
 
     async def _keys(self, request: Request) -> Response:
@@ -264,10 +260,6 @@ class FakeIdentityProvider:
             return JSONResponse({"error": "invalid_token"}, 401)
         app_id = "another" if self.vice == "other_app" else CLIENT
         return JSONResponse({**self.people[who], "id": who, "app_id": app_id})
-
-    async def _out(self, request: Request) -> Response:
-        self.asked.append(f"/out?{request.url.query}")
-        return RedirectResponse(request.query_params["post_logout_redirect_uri"], 303)
 
 
 @contextlib.asynccontextmanager

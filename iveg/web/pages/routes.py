@@ -8,7 +8,6 @@ from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from fastapi.responses import (
     FileResponse,
     HTMLResponse,
-    JSONResponse,
     RedirectResponse,
 )
 from pydantic import Field
@@ -86,7 +85,7 @@ def router(
     Args:
         pages: What draws them.
         rule: The version in force.
-        sign_on: Signs people in and out at the identity provider; None: there is none.
+        sign_on: Signs people in at the identity provider; None: there is none.
     """
     routes = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
     for needs, paths in _SCRIPTED.items():
@@ -111,7 +110,7 @@ def router(
     async def about(request: Request, visitor: Reader) -> Response:
         return pages.draw(AboutPage(pages.frame(request, "about", visitor), rule()))
 
-    _add_signing(routes, pages, sign_on)
+    _add_signing(routes, pages)
     if sign_on is not None:
         _add_single_sign_on(routes, pages, sign_on)
     return routes
@@ -162,7 +161,7 @@ class _ByInvitation(Body):
     password: str = Field(min_length=LEAST, max_length=MOST)
 
 
-def _add_signing(routes: APIRouter, pages: Pages, sign_on: SingleSignOn | None) -> None:
+def _add_signing(routes: APIRouter, pages: Pages) -> None:
     """Add the routes of sign-in, sign-out and of a screen on a wall."""
 
     @routes.get("/signin", response_model=None, dependencies=STRANGERS)
@@ -188,17 +187,7 @@ def _add_signing(routes: APIRouter, pages: Pages, sign_on: SingleSignOn | None) 
         "/signout", response_model=None, dependencies=[Depends(require("stop"))]
     )
     async def sign_out(request: Request) -> Response:
-        authenticator = authenticator_of(request)
-        who = authenticator.identify(request)
-        # Here before anywhere else.
-        gone = authenticator.sign_out(request)
-        if sign_on is None or who is None:
-            return gone
-        onward = await sign_on.sign_out_address(request, who)
-        if onward is None:
-            return gone
-        cookie = gone.headers["set-cookie"]
-        return JSONResponse({"next": onward}, headers={"Set-Cookie": cookie})
+        return authenticator_of(request).sign_out(request)
 
     @routes.post("/wall", status_code=204)
     async def wall(request: Request, visitor: Reader) -> None:

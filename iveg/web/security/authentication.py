@@ -22,7 +22,7 @@ from starlette.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-from iveg.domain.accounts import DEFAULT_NAME, Account, name_key
+from iveg.domain.accounts import DEFAULT_NAME, Account
 from iveg.domain.errors import NotAllowedError
 from iveg.vital.audit import AuditTrail
 from iveg.web.cookies import keep_language, session_cookie
@@ -113,9 +113,7 @@ class Authenticator:
         A wrong name is told as a wrong password, and takes as long.
         """
         proof = partial(self.people.sign_in, name, password)
-        return await self._prove(
-            request, proof, "wrong name or password", name_key(name)
-        )
+        return await self._prove(request, proof, "wrong name or password")
 
     async def accept(
         self, request: Request, invitation: str, password: str
@@ -132,17 +130,16 @@ class Authenticator:
         A wrong old one counts as a sign-in that was refused.
         """
         proof = partial(self.people.change_password, who, old, new)
-        return await self._prove(request, proof, "wrong password", name_key(who.name))
+        return await self._prove(request, proof, "wrong password")
 
     async def _prove(
         self,
         request: Request,
         proof: Callable[[], Awaitable[Account | None]],
         wrong: str,
-        name: str = "",
     ) -> Response:
         refuse_forgery(request)
-        account = await self.attempts.weigh(request, proof, wrong, name)
+        account = await self.attempts.weigh(request, proof, wrong)
         self._end_before(request)
         cookie = self.sessions.open(
             account.name, account.role, account.account_id, "password"

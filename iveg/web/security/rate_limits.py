@@ -1,13 +1,11 @@
-"""Limits of WebSockets and of their messages (SECURITY.md).
+"""Limits of sign-ins, of WebSockets and of their messages (SECURITY.md).
 
-STOP is never limited, not on a WebSocket that sends too much.  Painted frames are
-counted apart: a page reports every frame that its screen shows.
+One mechanism, an ``Allowance``, bounds all of them.  STOP is never limited, not on a
+WebSocket that sends too much.
 """
 
-import asyncio
-import contextlib
+from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 from starlette.requests import HTTPConnection
@@ -16,49 +14,77 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from iveg.domain.errors import UnreadableError
 from iveg.ngsi.codec import load_json
 from iveg.vital.ports import Clock
-from iveg.web.security.attempts import Allowance
+from iveg.web.problems import Problem
 from iveg.web.security.roles import Principal
 
-MESSAGES_PER_S = 20
-PAINTED_PER_S = 300
-"""More than frames are ever sent in a second: every honest report counts."""
-SOCKETS = 5
-PROGRAM_SOCKETS = 20
-"""Programs share one token."""
+SIGN_INS_PER_S: Final = 20.0
+"""As many as one thread can compute."""
+MESSAGES_PER_S: Final = 300.0
+"""More than a page ever sends: it reports each frame that its screen shows."""
+SOCKETS: Final = 20
 TOO_MANY_SOCKETS: Final = 4429
-"""Close code of ``/live`` for one more than ``SOCKETS`` of the same session."""
+"""Close code of ``/live`` for one more than ``SOCKETS`` of the same owner."""
 
 _LONGEST_STOP = 4096
 """Bytes of a message that is looked at beyond the limit."""
-_FAREWELL_S = 1.0
-_SILENT_S = 3.0
-"""Pages ping every second; one silent for longer hangs on a dead line."""
 
 
-@dataclass(eq=False, slots=True)
-class _Socket:
-    heard_at: float
-    allowance: Allowance
-    painting: Allowance
-    serving: asyncio.Task[None] | None = None
-    ended: bool = False
+class Allowance:
+    """A number of uses that fills again with time (a token bucket).
 
-    def end(self) -> None:
-        """Serve it no longer."""
-        self.ended = True
-        if self.serving is not None:
-            self.serving.cancel()
+    Args:
+        most: How many uses may come at once.
+        per_s: How many come back in a second.
+        now: Monotonic time (s).
+    """
+
+    def __init__(self, most: float, per_s: float, now: float) -> None:
+        self._most, self._per_s = most, per_s
+        self._left, self._at = most, now
+
+    def wait_s(self, now: float) -> float:
+        """Time until one more is allowed (s); 0: it is allowed now."""
+        left = self._left + (now - self._at) * self._per_s
+        return max(0.0, (1.0 - left) / self._per_s)
+
+    def admit(self, now: float) -> bool:
+        """Use one up, where one is allowed; whether it was."""
+        if self.wait_s(now) > 0.0:
+            return False
+        left = self._left + (now - self._at) * self._per_s
+        self._left, self._at = min(self._most, left) - 1.0, now
+        return True
+
+
+class SignInGate:
+    """Refuses (429) sign-ins beyond twenty a second before anything looks at them.
+
+    A limit by address alone is none for an attacker who has many, and each request that
+    is looked at costs the loop on which a STOP runs some milliseconds.
+    """
+
+    def __init__(self, app: ASGIApp, clock: Clock) -> None:
+        self._app, self._clock = app, clock
+        self._allowance = Allowance(SIGN_INS_PER_S, SIGN_INS_PER_S, clock().mono)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        is_sign_in = (
+            scope["type"] == "http"
+            and scope["method"] == "POST"
+            and scope["path"] == "/signin"
+        )
+        if is_sign_in and not self._allowance.admit(self._clock().mono):
+            detail = "Too many sign in at once; try again in a moment."
+            headers = {"Retry-After": "2", "Connection": "close"}
+            refusal = Problem(429, detail, "busy", headers=headers).response()
+            await refusal(scope, receive, send)
+            return
+        await self._app(scope, receive, send)
 
 
 class SocketLimits:
-    """WebSockets of a principal, and the messages of each.
-
-    Five for a session, twenty for all programs together; twenty messages a second each
-    (painted frames: 300).
-
-    Of more WebSockets the silent one is closed: it is a page that lost its line and
-    came back.  When all of them are alive the new one is refused, so that the pages of
-    one person do not push each other out in turn.
+    """At most twenty WebSockets of a session or program, and 300 messages a second.
 
     Args:
         identify: The principal; strangers are left to authentication.
@@ -74,7 +100,7 @@ class SocketLimits:
         self._app = app
         self._identify = identify
         self._clock = clock
-        self._sockets: dict[bytes | str, list[_Socket]] = {}
+        self._open: Counter[bytes | str] = Counter()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
@@ -83,84 +109,44 @@ class SocketLimits:
         if who is None:
             await self._app(scope, receive, send)
             return
-        now = self._clock().mono
         owner = who.session or who.name
-        sockets = self._sockets.setdefault(owner, [])
-        # Programs only listen: their silence says nothing.
-        is_free = len(sockets) < PROGRAM_SOCKETS
-        if who.session is not None:
-            is_free = _make_room(sockets, now)
-        if not is_free:
+        if self._open[owner] >= SOCKETS:
             await _refuse(scope, receive, send)
             return
-        socket = _Socket(
-            now, Allowance(MESSAGES_PER_S, now), Allowance(PAINTED_PER_S, now)
-        )
-        sockets.append(socket)
+        self._open[owner] += 1
         try:
-            await self._serve(socket, scope, receive, send)
+            await self._app(scope, self._limited(receive), send)
         finally:
-            sockets.remove(socket)
-            if not sockets:
-                self._sockets.pop(owner, None)
+            self._open[owner] -= 1
+            if not self._open[owner]:
+                del self._open[owner]
 
-    async def _serve(
-        self, socket: _Socket, scope: Scope, receive: Receive, send: Send
-    ) -> None:
-        async def run() -> None:
-            await self._app(scope, self._listening(socket, receive), send)
-
-        socket.serving = asyncio.create_task(run(), name="live-socket")
-        try:
-            await socket.serving
-        except asyncio.CancelledError:
-            if not socket.ended:
-                raise
-            # Its line is dead, so this may not arrive; the server ends it all the same.
-            with contextlib.suppress(TimeoutError, OSError, RuntimeError):
-                async with asyncio.timeout(_FAREWELL_S):
-                    await send({"type": "websocket.close", "code": TOO_MANY_SOCKETS})
-
-    def _listening(self, socket: _Socket, receive: Receive) -> Receive:
-        """The messages of a page, within its limits."""
+    def _limited(self, receive: Receive) -> Receive:
+        """The messages of one WebSocket, within the limit; each STOP beyond it, too."""
+        allowance = Allowance(MESSAGES_PER_S, MESSAGES_PER_S, self._clock().mono)
 
         async def receive_limited() -> Message:
             while True:
                 message = await receive()
-                now = self._clock().mono
-                socket.heard_at = now
-                if message["type"] != "websocket.receive":
-                    return message
-                kind = _kind_of(message)
-                of = socket.painting if kind == "painted" else socket.allowance
-                if kind == "stop" or of.admit(now):
+                if (
+                    message["type"] != "websocket.receive"
+                    or allowance.admit(self._clock().mono)
+                    or _is_stop(message)
+                ):
                     return message
 
         return receive_limited
 
 
-def _make_room(sockets: list[_Socket], now: float) -> bool:
-    """Whether one more WebSocket may come in; ends a silent one where it must."""
-    served = [socket for socket in sockets if not socket.ended]
-    if len(served) < SOCKETS:
-        return True
-    silent = min(served, key=lambda socket: socket.heard_at)
-    if now - silent.heard_at < _SILENT_S:
-        return False
-    silent.end()
-    return True
-
-
-def _kind_of(message: Message) -> object:
-    """Kind that a message names; None where it is no STOP by its length alone."""
+def _is_stop(message: Message) -> bool:
     text = message.get("text") or ""
     if len(text) > _LONGEST_STOP:
-        return None
+        return False
     try:
         read = load_json(text)
     except UnreadableError:
-        return None
-    return read.get("type") if isinstance(read, dict) else None
+        return False
+    return isinstance(read, dict) and read.get("type") == "stop"
 
 
 async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:

@@ -8,14 +8,13 @@ import { need, setText } from "./dom.js";
 export function createSignOut({ i18n }) {
   const button = /** @type {HTMLButtonElement} */ (need("#sign-out"));
   button.addEventListener("click", async () => {
-    const next = await signOut();
-    if (next) location.assign(next);
+    if (await signOut()) location.assign("/signin");
     else setText(need("#sign-out-note"), i18n.t("signout.failed"));
   });
   button.disabled = false;
 }
 
-/** Where to go on, at the identity provider where that is asked to, too; null: failed. */
+/** Whether the session has ended on the server. */
 async function signOut() {
   try {
     // The answer redirects to a page that needs a session.
@@ -24,10 +23,8 @@ async function signOut() {
       headers: { "X-IVEG": "1" },
       redirect: "manual",
     });
-    if (answer.status === 200) return String((await answer.json()).next);
-    const isOut = answer.type === "opaqueredirect" || answer.status === 401;
-    return isOut ? "/signin" : null;
+    return answer.type === "opaqueredirect" || answer.status === 401;
   } catch {
-    return null;
+    return false;
   }
 }

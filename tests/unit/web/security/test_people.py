@@ -29,12 +29,7 @@ class PeoplesDesk(WebDesk):
         super().__init__()
         eva = replace(EVA, invited_until=self.clock().wall + 60.0)
         self.book.accounts.update({"P1": ANA, "P2": eva})
-        self.paused: list[float] = []
-        self.authenticator.attempts.pause = self._pause
         self.app.include_router(router(self.pages, rule=lambda: self.rules.current))
-
-    async def _pause(self, seconds: float) -> None:
-        self.paused.append(seconds)
 
     def page(self) -> httpx.AsyncClient:
         return self._client(OWN)
@@ -239,29 +234,6 @@ async def test_signing_in_anew_ends_the_session_before(
         assert await enter(page, **proof) == 204
 
     assert desk.authenticator.sessions.find(before) is None
-
-
-async def test_an_account_waits_ever_longer_for_guesses_from_anywhere_and_is_not_shut(
-    desk: PeoplesDesk,
-) -> None:
-    async def guess(number: int, name: str) -> int:
-        transport = httpx.ASGITransport(desk.app, client=(f"10.0.0.{number}", 1))
-        async with httpx.AsyncClient(
-            transport=transport, base_url=f"http://{HOST}", headers=OWN
-        ) as page:
-            desk.clock.now += 1.0
-            return await enter(page, name=name, password="wrong-password")
-
-    wrong = [await guess(number, ANA.name) for number in range(9)]
-    waited, desk.paused = desk.paused, []
-    async with desk.page() as page:
-        right = await enter(page, name="ana núñez", password="acelga-1234")
-        again = await enter(page, name=ANA.name, password="acelga-1234")
-
-    assert wrong == [401] * 9
-    assert waited == [1.0, 2.0, 4.0, 8.0, 10.0, 10.0]
-    # The right one waits once more, and forgives its own account.
-    assert (right, again, desk.paused) == (204, 204, [10.0])
 
 
 @pytest.mark.parametrize(
