@@ -181,7 +181,6 @@ class Lab:
         configuration = {
             **by_keys(self.settings.rule),
             "direct_read": self.settings.direct_read,
-            "uplink": self.settings.uplink,
         }
         result = result_of(self.plan, self._outcomes, configuration, why)
         write_json(self.directory / "result.json", result)
