@@ -13,7 +13,8 @@ it for all else, too.
 import asyncio
 import logging
 import socket
-from collections.abc import Awaitable, Callable, Coroutine, Iterable
+from collections.abc import Awaitable, Callable, Coroutine
+from contextlib import suppress
 from typing import Final
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
@@ -69,79 +70,20 @@ def current_principal(
     return current if current is not None and current.may(action) else None
 
 
-class ClientMessages:
-    """Messages from one browser: pings, presses, painted frames.
-
-    Answers go out with all else, so that a press is read at once also where the way
-    back is full.
-    """
-
-    def __init__(
-        self,
-        websocket: WebSocket,
-        subscriber: Subscriber,
-        clock: Clock,
-        stop: Stop,
-        principal: Principal,
-        feed: TelemetryFeed,
-    ) -> None:
-        self._websocket = websocket
-        self._subscriber = subscriber
-        self._clock = clock
-        self._stop = stop
-        self._principal = principal
-        self._feed = feed
-
-    async def listen(self, others: Iterable[asyncio.Task[None]]) -> None:
-        """Until the browser goes or is sent away; then ``others`` end, too."""
-        line = self._websocket
-        try:
-            while line.application_state is WebSocketState.CONNECTED:
-                await self._hear(await line.receive_text())
-        except WebSocketDisconnect:
-            return
-        finally:
-            for task in others:
-                task.cancel()
-
-    async def _hear(self, raw: str) -> None:
-        try:
-            message = load_json(raw[:_MAX_MESSAGE])
-        except UnreadableError as error:
-            self._subscriber.append(topics.PROBLEM.name, {"reason": error.reason})
-            return
-        if not isinstance(message, dict):
-            return
-        match message.get("type"):
-            case "painted":
-                now = self._clock().mono
-                self._feed.painted(message.get("frame"), now, message)
-            case "ping":
-                t, server = message.get("t"), self._clock().wall
-                self._subscriber.append(topics.PONG.name, {"t": t, "server": server})
-            case "stop":
-                await self._press(message)
-
-    async def _press(self, message: dict[str, object]) -> None:
-        robot_id = message.get("robot_id")
-        who = current_principal(self._websocket, self._principal, "stop")
-        if who is not None and (robot_id is None or isinstance(robot_id, str)):
-            try:
-                await self._stop(robot_id, who, read_press(message))
-            except UnknownRobotError as error:
-                reason = legible(str(error))
-                self._subscriber.append(topics.PROBLEM.name, {"reason": reason})
-
-
 TOO_SLOW = 4008
-_SEND_LIMIT_S = 10.0
+_READ_WITHIN_S = 10.0
+"""How long a browser may take to read one message."""
 
 
 class Line:
-    """The messages to one browser, one after the other.
+    """Messages to one browser, one after the other, and messages from it.
+
+    Answers go out with all else, so that a press is read at once also where the way
+    back is full.
 
     Args:
-        limit_s: How long a browser may take to read one.
+        feed: Makes its telemetry.
+        within_s: How long a browser may take to read one message.
     """
 
     def __init__(
@@ -149,66 +91,93 @@ class Line:
         websocket: WebSocket,
         subscriber: Subscriber,
         encoder: Encoder,
+        feed: TelemetryFeed,
         clock: Clock,
-        limit_s: float = _SEND_LIMIT_S,
+        within_s: float = _READ_WITHIN_S,
     ) -> None:
-        self._websocket = websocket
-        self._subscriber = subscriber
-        self._encoder = encoder
-        self._clock = clock
-        self._limit_s = limit_s
-        self._sending_since: float | None = None
+        self._websocket, self._subscriber = websocket, subscriber
+        self._encoder, self._feed, self._clock = encoder, feed, clock
+        self._within_s = within_s
 
     async def say(self, frame: bytes) -> None:
         """Send JSON."""
-        await sent(self._websocket.send_text(frame.decode()))
+        await self._sent(self._websocket.send_text(frame.decode()))
 
-    async def send(self, feed: TelemetryFeed) -> None:
-        """Everything, as fast as the browser reads; telemetry as fast as it paints."""
-        loop = asyncio.get_running_loop()
+    async def send(self) -> None:
+        """Send all there is, as fast as the browser reads; telemetry as it paints."""
         while not self._subscriber.overflowed:
-            self._sending_since = None
-            await self._subscriber.news(feed.wait_s(self._clock().mono))
-            self._sending_since = loop.time()
-            await self._send_frame(feed)
-            await self._send_news()
-        await self.close_slow()
-
-    @property
-    def is_stuck(self) -> bool:
-        """Whether the browser has not read for long."""
-        since = self._sending_since
-        now = asyncio.get_running_loop().time()
-        return since is not None and now - since > self._limit_s
-
-    async def close_slow(self) -> None:
-        """Close: the browser reads too slowly."""
-        await sent(self._websocket.close(TOO_SLOW))
-
-    async def _send_frame(self, feed: TelemetryFeed) -> None:
-        frame = feed.next_frame(self._clock())
-        if frame is not None:
-            await sent(self._websocket.send_bytes(frame))
-
-    async def _send_news(self) -> None:
-        for topic, item in self._subscriber.drain_events():
-            await self.say(self._encoder.event(topic, item))
-        for topic in self._subscriber.drain_topics():
-            frame = self._encoder.frame(topic)
+            await self._subscriber.news(self._feed.wait_s(self._clock().mono))
+            frame = self._feed.next_frame(self._clock())
             if frame is not None:
-                await self.say(frame)
+                await self._sent(self._websocket.send_bytes(frame))
+            for topic, item in self._subscriber.drain_events():
+                await self.say(self._encoder.event(topic, item))
+            for topic in self._subscriber.drain_topics():
+                if (told := self._encoder.frame(topic)) is not None:
+                    await self.say(told)
+        await self.close(TOO_SLOW)
 
+    async def close(self, code: int) -> None:
+        """Send the browser away."""
+        await self._sent(self._websocket.close(code))
 
-async def sent(sending: Coroutine[object, object, None]) -> None:
-    """Send; of a socket that has closed meanwhile a server says RuntimeError.
+    async def _sent(self, sending: Coroutine[object, object, None]) -> None:
+        """Send; of a socket that has closed meanwhile a server says RuntimeError.
 
-    Raises:
-        ConnectionResetError: the browser is gone.
-    """
-    try:
-        await sending
-    except RuntimeError as error:
-        raise ConnectionResetError(str(error)) from error
+        Raises:
+            ConnectionError: the browser is gone, or reads nothing.
+        """
+        try:
+            async with asyncio.timeout(self._within_s):
+                await sending
+        except RuntimeError as error:
+            raise ConnectionResetError(str(error)) from error
+        except TimeoutError as error:
+            with suppress(RuntimeError, TimeoutError):
+                async with asyncio.timeout(_CHECK_S):
+                    await self._websocket.close(TOO_SLOW)
+            raise ConnectionAbortedError("reads too slowly") from error
+
+    async def listen(self, stop: Stop, principal: Principal) -> None:
+        """Take pings, presses and painted frames until the browser goes."""
+        while self._websocket.application_state is WebSocketState.CONNECTED:
+            raw = await self._websocket.receive_text()
+            try:
+                message = load_json(raw[:_MAX_MESSAGE])
+            except UnreadableError as error:
+                self._complain(error.reason)
+                continue
+            match message:
+                case {"type": "painted"}:
+                    frame, now = message.get("frame"), self._clock().mono
+                    self._feed.painted(frame, now, message)
+                case {"type": "ping"}:
+                    pong = {"t": message.get("t"), "server": self._clock().wall}
+                    self._subscriber.append(topics.PONG.name, pong)
+                case {"type": "stop"}:
+                    await self._press(message, stop, principal)
+
+    async def _press(
+        self, message: dict[str, object], stop: Stop, principal: Principal
+    ) -> None:
+        robot_id = message.get("robot_id")
+        who = current_principal(self._websocket, principal, "stop")
+        if who is not None and (robot_id is None or isinstance(robot_id, str)):
+            try:
+                await stop(robot_id, who, read_press(message))
+            except UnknownRobotError as error:
+                self._complain(legible(str(error)))
+
+    def _complain(self, reason: str) -> None:
+        self._subscriber.append(topics.PROBLEM.name, {"reason": reason})
+
+    async def watch(self, principal: Principal) -> None:
+        """Close soon after the session is over.  STOP stays possible over HTTP."""
+        while True:
+            await asyncio.sleep(_CHECK_S)
+            if current_principal(self._websocket, principal, "read") is None:
+                await self.close(NO_SESSION)
+                return
 
 
 _log = logging.getLogger(__name__)
@@ -246,24 +215,22 @@ def router(
             return
         await websocket.accept(SUBPROTOCOL)
         subscriber = hub.join()
-        line = Line(websocket, subscriber, encoder, clock)
         feed = TelemetryFeed(encoder.telemetry, subscriber, Painting(latency))
+        line = Line(websocket, subscriber, encoder, feed, clock)
         try:
             now = clock()
             await line.say(
                 frame_text(topics.SNAPSHOT.name, snapshot(principal, now), now)
             )
             async with asyncio.TaskGroup() as tasks:
-                sender = tasks.create_task(line.send(feed), name="live-send")
-                watcher = tasks.create_task(
-                    _watch(websocket, principal, line), name="live-watch"
-                )
-                messages = ClientMessages(
-                    websocket, subscriber, clock, stop, principal, feed
-                )
-                tasks.create_task(
-                    messages.listen((sender, watcher)), name="live-listen"
-                )
+                others = [
+                    tasks.create_task(line.send(), name="live-send"),
+                    tasks.create_task(line.watch(principal), name="live-watch"),
+                ]
+                with suppress(WebSocketDisconnect):
+                    await line.listen(stop, principal)
+                for task in others:
+                    task.cancel()
         except* (WebSocketDisconnect, ConnectionError) as gone:
             _log.debug("browser gone: %s", gone)
         except* Exception:
@@ -273,18 +240,3 @@ def router(
             hub.leave(subscriber)
 
     return routes
-
-
-async def _watch(websocket: WebSocket, principal: Principal, line: Line) -> None:
-    """Close soon after the session is over, or when the browser reads nothing.
-
-    STOP stays possible over HTTP.
-    """
-    while True:
-        await asyncio.sleep(_CHECK_S)
-        if current_principal(websocket, principal, "read") is None:
-            await sent(websocket.close(NO_SESSION))
-            return
-        if line.is_stuck:
-            await line.close_slow()
-            return
