@@ -44,7 +44,7 @@ from iveg.ngsi import codec
 from iveg.vital.operators import _lines
 from iveg.settings import Settings, describe
 from iveg.web.api.rule import RuleChange
-from iveg.web.pages.contexts import Appearance, Page, PageFrame, Site
+from iveg.web.pages.contexts import Appearance, PageFrame, Site
 from iveg.web.pages.drawing import environment_of
 from iveg.web.pages.sentences import read_sentences
 from iveg.web.security.audited import AUDITED
@@ -54,9 +54,9 @@ rule = DetectionRule.of(settings.rule)
 change = RuleChange(class_pauses_s={"person": 4.0})
 line = json.dumps(rule_fields(rule))
 site = Site("none", ("AGI",), "1", demo=False)
-page = Page(PageFrame(site, Appearance("en"), "settings", "ana", "operator"))
+frame = PageFrame(site, Appearance("en"), "settings", "ana", "operator")
 drawn = environment_of(read_sentences("en")).get_template("settings.html")
-html = drawn.render(page=page)
+html = drawn.render(page={"frame": frame})
 told = Feedback("AGI", Origin("b", 1), rule=sent_to_robots(rule))
 print(json.dumps({
     "settings": settings.to_environment()["IVEG_PAUSE_S"],

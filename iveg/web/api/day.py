@@ -48,7 +48,6 @@ from iveg.web.api.answers import Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES
 from iveg.web.api.history_filters import HistoryDay, Range, Span, range_of
 from iveg.web.pages import charts
-from iveg.web.pages.contexts import DayPage
 from iveg.web.pages.drawing import Pages
 from iveg.web.pages.sentences import in_madrid, start_of
 from iveg.web.security.requirements import refusals, require
@@ -370,8 +369,9 @@ def router(read: ReadDay, pages: Pages, clock: Clock) -> APIRouter:
         found = await read(wanted, now)
         before, after = ((wanted + step).isoformat() for step in (-_DAY, _DAY))
         frame = pages.frame(request, "day", visitor)
-        page = DayPage(frame, found, before, after)
         # The first drawing also reads the template.
-        return await asyncio.to_thread(pages.draw, page)
+        return await asyncio.to_thread(
+            pages.draw, frame, day=found, before=before, after=after
+        )
 
     return routes

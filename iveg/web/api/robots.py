@@ -1,22 +1,12 @@
-"""REST twins of live topics (docs/interfaces/http.md), costmap and camera coverage.
+"""REST twins of live topics (docs/interfaces/http.md), costmap and camera coverage."""
 
-The costmap comes as numbers for programs and the page, and as a picture for people: a
-PNG of shades of grey, white free and black taken, with the grey that ROS map files use
-for unknown; its first line is the north.
-"""
-
-import asyncio
-from io import BytesIO
 from typing import Annotated
 
-import numpy as np
 import orjson
-from fastapi import APIRouter, Query, Request, Response
-from numpy.typing import NDArray
-from PIL import Image
+from fastapi import APIRouter, Query, Response
 
 from iveg.comfort.maps import CoverageMonitor, Mapper
-from iveg.domain.costmap import UNKNOWN, InflatedGrid
+from iveg.domain.costmap import InflatedGrid
 from iveg.domain.coverage import RECENT_S
 from iveg.domain.observations import Instant
 from iveg.domain.rule.zones import zones_of
@@ -41,8 +31,6 @@ from iveg.web.api.answers import Json
 from iveg.web.security.requirements import READERS, refusals
 from iveg.web.views import Views
 
-_PNG = "image/png"
-_UNKNOWN_GREY = 205
 _NOTHING = CostmapModel(
     resolution=0.1, width=0, height=0, origin=Point(x=0.0, y=0.0), data=[]
 )
@@ -109,15 +97,14 @@ def cells_router(
     @routes.get(
         "/costmap",
         response_model=CostmapModel,
-        responses={200: {"content": {_PNG: {}}}, **refusals(404)},
+        responses=refusals(404),
     )
     async def costmap(
-        request: Request, robot: Annotated[str | None, Query(max_length=64)] = None
+        robot: Annotated[str | None, Query(max_length=64)] = None,
     ) -> Response:
         """The shared costmap, or what one robot believes.
 
-        Rows from the south, 0 free to 100 taken, -1 unknown; a PNG where the caller
-        accepts `image/png`.
+        Rows from the south, 0 free to 100 taken, -1 unknown.
         """
         now = clock()
         world = evaluator.world
@@ -126,12 +113,8 @@ def cells_router(
             found = mapper.shared(zones, now)
         else:
             found = mapper.of(world.robot(robot).robot_id, zones, now)
-        headers = {"Vary": "Accept"}
-        if _PNG in request.headers.get("accept", ""):
-            body = await asyncio.to_thread(write_png, _shades(found))
-            return Response(body, 200, headers, _PNG)
-        age = mapper.age_s(robot, now)
-        return Response(_json(found, age), 200, headers, "application/json")
+        body = _json(found, mapper.age_s(robot, now))
+        return Response(body, media_type="application/json")
 
     @routes.get("/coverage", response_model=Coverage)
     async def coverage() -> Response:
@@ -168,22 +151,6 @@ def _json(costmap: InflatedGrid | None, age_s: float | None) -> bytes:
         "age_s": None if age_s is None else round(age_s, 1),
     }
     return orjson.dumps(members, option=orjson.OPT_SERIALIZE_NUMPY)
-
-
-def _shades(costmap: InflatedGrid | None) -> NDArray[np.uint8]:
-    if costmap is None:
-        return np.full((1, 1), _UNKNOWN_GREY, np.uint8)
-    data = costmap.data
-    shades = np.rint(255 - data.astype(np.float32) * 2.55).clip(0, 255).astype(np.uint8)
-    shades[data == UNKNOWN] = _UNKNOWN_GREY
-    return np.ascontiguousarray(shades[::-1])
-
-
-def write_png(shades: NDArray[np.uint8]) -> bytes:
-    """A picture of grey shades, shape (height, width), as a PNG (ISO 15948)."""
-    file = BytesIO()
-    Image.fromarray(shades).save(file, "png")
-    return file.getvalue()
 
 
 def _lanes(monitor: CoverageMonitor, now: Instant) -> list[LaneCoverage]:

@@ -147,14 +147,16 @@ class Line:
             except UnreadableError as error:
                 self._complain(error.reason)
                 continue
-            match message:
-                case {"type": "painted"}:
+            if not isinstance(message, dict):
+                continue
+            match message.get("type"):
+                case "painted":
                     frame, now = message.get("frame"), self._clock().mono
                     self._feed.painted(frame, now, message)
-                case {"type": "ping"}:
+                case "ping":
                     pong = {"t": message.get("t"), "server": self._clock().wall}
                     self._subscriber.append(topics.PONG.name, pong)
-                case {"type": "stop"}:
+                case "stop":
                     await self._press(message, stop, principal)
 
     async def _press(

@@ -17,15 +17,7 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.parameters import CLASSES, PARAMETERS
 from iveg.domain.stamps import format_stamp
 from iveg.web import cookies
-from iveg.web.pages.contexts import (
-    THEMES,
-    Appearance,
-    ErrorPage,
-    Page,
-    PageFrame,
-    SignInPage,
-    Site,
-)
+from iveg.web.pages.contexts import THEMES, Appearance, PageFrame, Site
 from iveg.web.pages.sentences import (
     LANGUAGES,
     Sentences,
@@ -149,16 +141,19 @@ class Pages:
             unready=not self._is_ready(),
         )
 
-    def draw(self, page: Page, status: int = 200) -> HTMLResponse:
+    def draw(self, frame: PageFrame, code: int = 200, **added: object) -> HTMLResponse:
         """A page as a response.
 
         Args:
-            page: Its context.
-            status: HTTP status.
+            frame: Surrounds it; its route names the template.
+            code: HTTP status.
+            added: What else the template sees as members of ``page``.
         """
-        environment = self._environments[page.frame.look.language]
-        html = environment.get_template(f"{page.frame.route}.html").render(page=page)
-        return HTMLResponse(html, status, {"Vary": "Cookie, Accept-Language"})
+        template = self._environments[frame.look.language].get_template(
+            f"{frame.route}.html"
+        )
+        html = template.render(page={"frame": frame, **added})
+        return HTMLResponse(html, code, {"Vary": "Cookie, Accept-Language"})
 
     def problem(self, request: Request, problem: Problem) -> Response:
         """A problem as a page: sign-in for a stranger, an explanation for others."""
@@ -168,8 +163,8 @@ class Pages:
         # Somebody signed in keeps the STOP controls, whatever page went wrong.
         who = authenticator_of(request).identify(request)
         frame = self.frame(request, "error", who)
-        page = ErrorPage(frame, problem.status, f"error.{known}")
-        response = self.draw(page, problem.status)
+        code, sentence = problem.status, f"error.{known}"
+        response = self.draw(frame, code, status=code, sentence=sentence)
         response.headers.update(problem.headers)
         return response
 
@@ -190,7 +185,9 @@ class Pages:
         """The sign-in page; ``failure`` is the identity provider's."""
         address = str(request.base_url).rstrip("/")
         frame = self.frame(request, "signin")
-        return self.draw(SignInPage(frame, address, wrong, LEAST, failure), status)
+        return self.draw(
+            frame, status, address=address, wrong=wrong, least=LEAST, failure=failure
+        )
 
 
 def appearance_of(request: Request) -> Appearance:

@@ -16,13 +16,6 @@ from iveg.adapters.passwords import LEAST, MOST
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import SignOnError
 from iveg.models.base import Body
-from iveg.web.pages.contexts import (
-    AboutPage,
-    AccountPage,
-    EnteredPage,
-    Page,
-    RecordPage,
-)
 from iveg.web.pages.drawing import Pages
 from iveg.web.security.requirements import (
     READERS,
@@ -96,7 +89,7 @@ def router(
 
     @routes.get("/account", response_model=None)
     async def account(request: Request, visitor: Reader) -> Response:
-        return pages.draw(AccountPage(pages.frame(request, "account", visitor), LEAST))
+        return pages.draw(pages.frame(request, "account", visitor), least=LEAST)
 
     @routes.get("/decisions/{record_id}", name="decision", response_model=None)
     @routes.get("/commands/{record_id}", name="command", response_model=None)
@@ -104,11 +97,11 @@ def router(
         request: Request, visitor: Reader, record_id: _RecordId
     ) -> Response:
         frame = pages.frame(request, request.scope["route"].name, visitor)
-        return pages.draw(RecordPage(frame, record_id))
+        return pages.draw(frame, record_id=record_id)
 
     @routes.get("/about", response_model=None)
     async def about(request: Request, visitor: Reader) -> Response:
-        return pages.draw(AboutPage(pages.frame(request, "about", visitor), rule()))
+        return pages.draw(pages.frame(request, "about", visitor), rule=rule())
 
     _add_signing(routes, pages)
     if sign_on is not None:
@@ -125,7 +118,7 @@ def _add_scripted(
     async def scripted(
         request: Request, visitor: Annotated[Principal, Depends(require(needs))]
     ) -> Response:
-        return pages.draw(Page(pages.frame(request, route, visitor)))
+        return pages.draw(pages.frame(request, route, visitor))
 
 
 def _add_moved(routes: APIRouter, old: str, new: str) -> None:
@@ -217,8 +210,7 @@ def _add_single_sign_on(routes: APIRouter, pages: Pages, sign_on: SingleSignOn) 
             token, to = await sign_on.finish(request)
         except SignOnError as error:
             return refused(request, error)
-        page = EnteredPage(pages.frame(request, "entered"), to)
-        response = pages.draw(page)
+        response = pages.draw(pages.frame(request, "entered"), to=to)
         # A redirect would still be the provider's, and leave the Strict cookie behind.
         response.headers["Refresh"] = f"0; url={to}"
         return authenticator_of(request).admit(request, token, response)
