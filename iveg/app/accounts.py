@@ -3,7 +3,6 @@
 import asyncio
 import logging
 from contextlib import suppress
-from pathlib import Path
 from typing import Final
 
 from iveg.adapters.access_file import AccessFile, earlier_sessions
@@ -19,7 +18,7 @@ from iveg.domain.accounts import (
     ClaimReading,
     name_key,
 )
-from iveg.domain.audit import CONSOLE, ITSELF
+from iveg.domain.audit import CONSOLE
 from iveg.domain.errors import HopError, NameTakenError
 from iveg.domain.events import Condition
 from iveg.settings import Settings
@@ -35,7 +34,6 @@ SET_UP_S: Final = 1800.0
 """Validity of the first invitation of a new server (s)."""
 FIRST_ADMIN: Final = "admin"
 _LOOK_S, _COPY_AGAIN_S = 0.4, 5.0
-_SHOWN_S = 60.0
 _log = logging.getLogger(__name__)
 
 
@@ -60,28 +58,28 @@ class Accounts:
     ) -> None:
         self._file, self._url = file, database_url
         self._trail, self._supervision, self._clock = trail, supervision, clock
-        self._waiting: list[Path] = []
-        """Files to delete once the file of accounts has what they say."""
-        self._damages, self._damaged_at = 0, -_SHOWN_S
+        # With a file all whom an earlier version knew are in it.
+        self._is_copied = file.exists
         self.book = AccessBook(file.load())
-        if not file.exists:
-            before = file.beside("sessions.jsonl")
-            self.book.add(Access(sessions=earlier_sessions(before)))
-            self._waiting.append(before)
         self.book.on_change.append(self._note)
-        self.book.on_keep.append(lambda: file.save(self.book.picture()))
+        if self._is_copied:
+            self._remember()
+        else:
+            before = earlier_sessions(file.beside("sessions.jsonl"))
+            self.book.add(Access(sessions=before))
         self.people = People(self.book, Passwords(), clock)
+
+    def _remember(self) -> None:
+        """Have the file written from now on."""
+        self.book.on_keep.append(lambda: self._file.save(self.book.picture()))
+        self.book.keep()
 
     @property
     def state(self) -> str:
         """``ok``, ``damaged`` (somebody has to look) or ``unwritten``."""
         if self._file.failing:
             return "unwritten"
-        return "damaged" if self._is_damaged() else "ok"
-
-    def _is_damaged(self) -> bool:
-        age_s = self._clock().mono - self._damaged_at
-        return bool(self._file.aside) or age_s < _SHOWN_S
+        return "damaged" if self._file.aside else "ok"
 
     def ways_in(
         self,
@@ -114,7 +112,7 @@ class Accounts:
         Raises:
             HopError: nobody knows yet who was in an earlier version's database.
         """
-        if not self._file.copied:
+        if not self._is_copied:
             raise HopError("database", "accounts of earlier versions are not read yet")
         now = self._clock().wall
         if has_admin(self.people.known.values(), now):
@@ -129,59 +127,49 @@ class Accounts:
 
     async def run(self) -> None:
         """Look after the file until cancelled."""
-        self.book.keep()
-        copied_at = -_COPY_AGAIN_S
+        while not self._is_copied:
+            with suppress(HopError):
+                await self.copy_earlier()
+                break
+            await asyncio.sleep(_COPY_AGAIN_S)
         while True:
             await self._file.look()
             self._report()
             await self._take_changes()
-            now = self._clock().mono
-            if not self._file.copied and now - copied_at >= _COPY_AGAIN_S:
-                copied_at = now
-                with suppress(HopError):
-                    await self.copy_earlier()
             await asyncio.sleep(_LOOK_S)
-
-    async def copy_earlier(self) -> None:
-        """Copy who was known to an earlier version, once. Raises HopError."""
-        if self._file.copied:
-            return
-        found = await asyncio.to_thread(earlier_access, self._url)
-        self._file.copied = True
-        if found is None:
-            # Somebody took the file away while iVeg was down.
-            self._file.damaged += 1
-        self.book.add(found or NOBODY)
-        if found is not None and await self._file.taken([]):
-            await asyncio.to_thread(mark_moved, self._url, self._clock().wall)
 
     async def _take_changes(self) -> None:
         """Have changes of the console count."""
-        for path, change in await asyncio.to_thread(self._file.left):
-            if path in self._waiting:
-                continue
-            self._waiting.append(path)
+        left = await asyncio.to_thread(self._file.left)
+        for _, change in left:
             try:
                 self.book.apply(change)
             except NameTakenError as error:
                 _log.warning("a change of the console is left out: %s", error)
-        if self._waiting and await self._file.taken(self._waiting):
-            self._waiting.clear()
+        if left:
+            await self._file.drop([path for path, _ in left])
+
+    async def copy_earlier(self) -> None:
+        """Copy who was known to an earlier version, once. Raises HopError."""
+        if self._is_copied:
+            return
+        found = await asyncio.to_thread(earlier_access, self._url)
+        self._is_copied = True
+        self.book.add(found or NOBODY)
+        self._remember()
+        await self._file.look()
+        if found is not None and not self._file.failing:
+            await asyncio.to_thread(mark_moved, self._url, self._clock().wall)
 
     def _note(self, change: AccessChange) -> None:
         name, details, at = change.row.name, change.details, self._clock()
         self._trail.note(change.by, change.action, name, details, at=at)
 
     def _report(self) -> None:
-        """Tell people what is wrong with the file; each damage has its row."""
-        now = self._clock()
-        if self._file.damaged > self._damages:
-            self._damages, self._damaged_at = self._file.damaged, now.mono
-            details = {"aside": self._file.aside[-1:]}
-            self._trail.note(ITSELF, "accounts_damaged", details=details, at=now)
+        """Tell people what is wrong with the file."""
         wrong: list[Condition] = []
-        if self._is_damaged():
-            file = {"file": (self._file.aside or ["–"])[-1]}
+        if self._file.aside:
+            file = {"file": self._file.aside[-1]}
             wrong.append(Condition("P1", "alert.accounts_damaged", PART, None, file))
         if self._file.failing:
             wrong.append(Condition("P2", "alert.accounts_unwritten", PART))

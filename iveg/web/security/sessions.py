@@ -15,7 +15,6 @@ from dataclasses import replace
 from typing import cast
 
 from iveg.domain.accounts import (
-    DEFAULT_NAME,
     LINK_PERSON,
     OF_ACCOUNTS,
     AccessBook,
@@ -42,7 +41,6 @@ def role_at(session: Session, now: float) -> Role | None:
     return "expired" if over <= STOP_ONLY_S else None
 
 
-_FORMER = "", DEFAULT_NAME
 _KEEP_SEEN_S = 60.0
 """A crash forgets at most this much of a sign of life."""
 
@@ -177,9 +175,6 @@ class Sessions:
             # A clock that was ahead must not have made a session that never ends.
             began, seen = min(session.began, now), min(session.seen, now)
             known = replace(session, began=began, seen=seen)
-            # Earlier versions knew the link's person by that name alone.
-            if known.person == LINK_PERSON or (known.person, known.name) == _FORMER:
-                known = replace(known, name=self._link_name, person=LINK_PERSON)
             self._sessions[digest] = known
             if role_at(known, now) is None:
                 del self._sessions[digest]

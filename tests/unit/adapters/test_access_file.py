@@ -66,7 +66,7 @@ def test_all_of_it_is_read_as_it_was_written_and_by_its_owner_alone(
     written(path)
 
     assert file.load() == KEPT
-    assert (file.damaged, file.aside) == (0, [])
+    assert file.aside == []
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
 
 
@@ -82,10 +82,8 @@ def test_a_file_that_was_damaged_is_put_aside_and_what_is_whole_is_read(
     # Nothing that was not written is believed.
     assert set(found.accounts) <= {ANA}
     assert set(found.tokens) <= {MES}
-    assert file.damaged == 1
     (aside,) = file.aside
     assert aside.startswith("accounts.jsonl.damaged-")
-    assert AccessFile(path).read() == (found, True)
 
 
 @pytest.mark.parametrize("damage", [*DAMAGE.values(), Path.unlink])
@@ -99,7 +97,6 @@ async def test_what_happens_to_it_while_iveg_runs_is_written_anew_from_memory(
     await file.look()
     await file.look()
 
-    assert file.damaged == 1
     assert len(file.aside) == (damage is not Path.unlink)
     assert AccessFile(path).read() == (KEPT, True)
 
@@ -112,19 +109,17 @@ async def test_a_disk_that_fails_is_told_once_and_tried_again(
     for number in range(3):
         file.save(Access((replace(ANA, since=float(number)),)))
         await file.look()
-    failing, taken = file.failing, await file.taken([])
+    failing = file.failing
     beside.rmdir()
 
     await file.look()
 
-    assert failing
-    assert not taken
+    assert (failing, file.failing) == (True, False)
     assert caplog.text.count("could not be written") == 1
-    assert file.failing == ""
     assert AccessFile(path).read()[0].accounts == (replace(ANA, since=2.0),)
 
 
-async def test_a_change_of_the_console_waits_until_the_file_has_it(
+async def test_a_change_of_the_console_waits_until_the_server_drops_it(
     path: Path, file: AccessFile
 ) -> None:
     change = AccessChange(CONSOLE, "account_role", ANA, {"role": "operator"})
@@ -136,7 +131,7 @@ async def test_a_change_of_the_console_waits_until_the_file_has_it(
     path.with_name("accounts.jsonl.left-0").write_bytes(b"junk")
 
     left = file.left()
-    await file.taken([one for one, _ in left])
+    await file.drop([path for path, _ in left])
 
     assert [one for _, one in left] == [change, revoked]
     assert file.left() == []

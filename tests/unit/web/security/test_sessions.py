@@ -143,14 +143,11 @@ def test_a_session_that_was_lowered_is_a_viewers_and_stays_one(start: Restart) -
     ]
 
 
-def test_sessions_of_earlier_versions_stay_and_get_the_name_of_the_links_person(
-    tmp_path: Path, clock: FakeClock
-) -> None:
+def test_sessions_of_earlier_versions_stay(tmp_path: Path, clock: FakeClock) -> None:
     now, before = clock().wall, tmp_path / "sessions.jsonl"
     told = [
         {"name": "operator", "role": "operator"},
         {"name": "Nave 2", "role": "viewer", "method": "tablet", "holder": "P1"},
-        {"name": "root", "role": "root"},
     ]
     lines = [
         {
@@ -164,11 +161,10 @@ def test_sessions_of_earlier_versions_stay_and_get_the_name_of_the_links_person(
     write_lines(before, Form("sessions"), lines)
 
     book = AccessBook(Access(sessions=earlier_sessions(before)))
-    sessions = Sessions(clock, book, "Ana")
+    sessions = Sessions(clock, book, "operator")
 
-    found = [sessions.find(f"token-{number}") for number in range(3)]
-    assert [one and (one.name, one.role, one.person) for one in found] == [
-        ("Ana", "operator", "link"),
-        ("Nave 2", "viewer", ""),
-        None,
+    found = [sessions.find(f"token-{number}") for number in range(2)]
+    assert [one and (one.name, one.role, one.method) for one in found] == [
+        ("operator", "operator", "link"),
+        ("Nave 2", "viewer", "link"),
     ]
