@@ -107,7 +107,6 @@ class LatencyTable(Model):
         window: The window.
         rows: One for each kind of data.
         clocks: One for each robot.
-        style_ids: As of the climate.
     """
 
     at: str
@@ -125,8 +124,6 @@ class LatencyTable(Model):
         )
     )
     clocks: list[LatencyClock]
-    library: str = Field(description="Path of the script that draws the figure.")
-    style_ids: list[str]
     figures: dict[str, object] = Field(
         description="``cdf`` as Plotly draws it; empty if unwanted."
     )

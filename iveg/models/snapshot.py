@@ -8,14 +8,12 @@ from iveg.domain.equipment import Limit, State, TileStatus
 from iveg.domain.equipment import Tile as DomainTile
 from iveg.domain.observations import Climate as DomainClimate
 from iveg.domain.observations import Instant
-from iveg.domain.stamps import format_stamp
 from iveg.models.base import (
     GreenhouseMap,
     Model,
     Scan,
     Stamp,
     Thousandth,
-    rounded,
 )
 from iveg.models.command import Command
 from iveg.models.health import Health
@@ -49,32 +47,6 @@ class Climate(Air):
         """As it came in."""
         return cls.from_value(
             read, received_at=received, age_s=now.mono - received.mono
-        )
-
-
-class ClimateReading(Air):
-    """One reading of the past, or the mean of a slice of time.
-
-    Attributes:
-        at: When.
-    """
-
-    at: Stamp
-
-    @classmethod
-    def of_series(
-        cls,
-        at: float,
-        temperature: float | None,
-        relative_humidity: float | None,
-        co2: float | None,
-    ) -> Self:
-        """With no more decimals than sensors mean; ``at`` in Unix seconds."""
-        return cls(
-            at=format_stamp(at),
-            temperature=rounded(temperature, 2),
-            relative_humidity=rounded(relative_humidity, 4),
-            co2=rounded(co2, 1),
         )
 
 

@@ -23,7 +23,7 @@ from iveg.models.health import LatencyTable
 from iveg.models.history import AuditEntry, Decision, Reading
 from iveg.models.people import Thing
 from iveg.models.rule import Trial
-from iveg.models.snapshot import ClimateReading, PastWorld, Snapshot
+from iveg.models.snapshot import PastWorld, Snapshot
 
 TOLD: tuple[type[Model], ...] = (
     Snapshot,
@@ -36,7 +36,6 @@ TOLD: tuple[type[Model], ...] = (
     LatencyTable,
     FleetPressed,
     AuditEntry,
-    ClimateReading,
     Reading,
     SignInCode,
     Invitation,

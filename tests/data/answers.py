@@ -151,8 +151,6 @@ async def _over_http(page: httpx.AsyncClient) -> dict[str, Any]:
     for path in _ROUTES:
         answer = await page.get(f"/api/v1/{path}")
         told[f"REST {path.partition('?')[0]}"] = answer.json()
-    # Of the library's, which another version of it names otherwise.
-    told["REST latency"] |= {"library": "", "style_ids": []}
     for path in _FILES:
         answer = await page.get(f"/api/v1/{path}?format=ndjson")
         told[f"NDJSON {path}"] = [orjson.loads(one) for one in answer.iter_lines()]

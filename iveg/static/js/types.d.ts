@@ -101,17 +101,6 @@ export type Climate = {
   age_s: number;
 };
 
-/** One reading of the past, or the mean of a slice of time. */
-export type ClimateReading = {
-  /** °C. */
-  temperature: number | null;
-  /** 0 to 1. */
-  relative_humidity: number | null;
-  /** ppm. */
-  co2: number | null;
-  at: string;
-};
-
 /** One STOP, release, resume or goal. */
 export type Command = {
   times: CommandTimes;
@@ -549,9 +538,6 @@ export type LatencyTable = {
   /** The paper's printed numbers, by place, kind of data and column (ms). */
   paper: Record<string, Record<string, Record<string, number>>>;
   clocks: LatencyClock[];
-  /** Path of the script that draws the figure. */
-  library: string;
-  style_ids: string[];
   /** ``cdf`` as Plotly draws it; empty if unwanted. */
   figures: Record<string, unknown>;
 };

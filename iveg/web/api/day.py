@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import defaultdict
-from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from contextlib import closing
 from datetime import date, timedelta
 from typing import Annotated, Any
@@ -10,18 +10,25 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, HTTPException, Path, Query, Request, Response
 from orjson import Fragment
 
-from iveg.adapters.history import series
-from iveg.adapters.history.lists import COMMANDS, DECISIONS, MOST_ROWS, Filter
+from iveg.adapters.history.lists import (
+    COMMANDS,
+    DECISIONS,
+    MOST_ROWS,
+    Filter,
+    ListOf,
+    R,
+)
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.series import (
-    ClimateSeries,
+    AIR,
+    EQUIPMENT,
+    SPEEDS,
     CommandLatency,
-    ConfidenceCount,
-    MeasurementSeries,
-    SpeedSeries,
     command_latencies,
+    confidence_counts,
     people_seen,
     poses_of,
+    series_of,
 )
 from iveg.adapters.history.upkeep import lost_of
 from iveg.domain.alerts import MOST_KEPT
@@ -36,13 +43,12 @@ from iveg.domain.errors import HopError
 from iveg.domain.fleet import FleetDescription, as_counted
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
-from iveg.domain.records import ByTransport, CommandRecord, DecisionRecord
+from iveg.domain.records import ByTransport
 from iveg.domain.stamps import format_stamp
 from iveg.domain.transports import TRANSPORTS, TransportId
 from iveg.models.base import GreenhouseMap, Point, write_json
 from iveg.models.command import Command, Latency, LatencySpread, RobotLatency
 from iveg.models.history import Day, Encounters, Pass, Slowed, Worked
-from iveg.models.snapshot import ClimateReading
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES
@@ -53,7 +59,6 @@ from iveg.web.pages.sentences import in_madrid, start_of
 from iveg.web.security.requirements import refusals, require
 
 _DAY_S = 86_400.0
-_FOR_GOOD = "public, max-age=31536000, immutable"
 _FIGURES: dict[str, Any] = {
     "response_class": Response,
     "responses": {200: {"content": {"application/json": {}}}},
@@ -71,6 +76,15 @@ def add_routes(
 ) -> None:
     """Add the figures to the routes of the history, whose arguments these are."""
 
+    async def figures(
+        draw: Callable[..., Mapping[str, bytes]],
+        since: float,
+        until: float,
+        *facts: object,
+    ) -> Response:
+        body = await worker.run(_write_figures, draw, since, until, *facts)
+        return Response(body, media_type=MEDIA_TYPES["json"])
+
     @routes.get(
         "/api/v1/history/charts",
         summary="Plotly figures of a range",
@@ -78,36 +92,27 @@ def add_routes(
         "confidence, how long each STOP took; the last 15 minutes unless told.",
         **_FIGURES,
     )
-    async def draw(asked: Annotated[Range, Query()]) -> Response:
+    async def charted(asked: Annotated[Range, Query()]) -> Response:
         since, until = range_of(asked, read_clock().wall)
         found = await asyncio.gather(
-            queries.ask(series.speed_series, since, until, asked.robot),
-            queries.ask(series.confidence_counts, since, until, asked.robot),
-            queries.ask(series.command_latencies, since, until, asked.robot),
+            queries.ask(series_of, SPEEDS, since, until, asked.robot),
+            queries.ask(confidence_counts, since, until, asked.robot),
+            queries.ask(command_latencies, since, until, asked.robot),
         )
-        body = await worker.run(_draw_charts, *found, threshold(), fleet)
-        return Response(body, media_type=MEDIA_TYPES["json"])
-
-    @routes.get("/vendor/{name}", include_in_schema=False)
-    async def vendor(name: str) -> Response:
-        script = await asyncio.to_thread(charts.library)
-        if name != script.name:
-            raise HTTPException(404, "There is no such file.")
-        headers = {"Content-Encoding": "gzip", "Cache-Control": _FOR_GOOD}
-        return Response(script.packed, 200, headers, "text/javascript")
+        draw = charts.history_figures
+        return await figures(draw, since, until, *found, threshold(), fleet)
 
     @routes.get(
         "/api/v1/history/climate",
         summary="The air over a range",
-        description="Readings, or their means over slices of time, and Plotly figures "
-        "of them; the last 24 hours unless told.",
+        description="Plotly figures of readings, or of their means over slices of "
+        "time; the last 24 hours unless told.",
         **_FIGURES,
     )
     async def climate(asked: Annotated[Span, Query()]) -> Response:
         since, until = range_of(asked, read_clock().wall, _DAY_S)
-        found = await queries.ask(series.climate_series, since, until)
-        body = await worker.run(_draw_climate, found, since, until)
-        return Response(body, media_type=MEDIA_TYPES["json"])
+        found = await queries.ask(series_of, AIR, since, until)
+        return await figures(charts.climate_figures, since, until, found)
 
     @routes.get(
         "/api/v1/history/equipment",
@@ -118,56 +123,22 @@ def add_routes(
     )
     async def equipment(asked: Annotated[Span, Query()]) -> Response:
         since, until = range_of(asked, read_clock().wall, _DAY_S)
-        found = await queries.ask(series.measurement_series, since, until)
-        body = await worker.run(_draw_equipment, found, since, until)
-        return Response(body, media_type=MEDIA_TYPES["json"])
+        found = await queries.ask(series_of, EQUIPMENT, since, until)
+        return await figures(charts.equipment_figures, since, until, found)
 
 
-def _draw_charts(
-    speeds: Sequence[SpeedSeries],
-    counts: Sequence[ConfidenceCount],
-    stops: Sequence[CommandLatency],
-    threshold: float | None,
-    fleet: FleetDescription,
+def _write_figures(
+    draw: Callable[..., Mapping[str, bytes]],
+    since: float,
+    until: float,
+    *facts: object,
 ) -> bytes:
-    return write_json(
-        {
-            **charts.library_facts(),
-            "speed": Fragment(charts.speed_figure(speeds, fleet)),
-            "margin": Fragment(charts.margin_figure(speeds)),
-            "detections": Fragment(charts.confidence_figure(counts, threshold)),
-            "stops": Fragment(charts.stop_figure(stops)),
-        }
-    )
-
-
-def _draw_climate(air: ClimateSeries, since: float, until: float) -> bytes:
-    columns = (air.at, air.temperature, air.relative_humidity, air.co2)
-    items = [ClimateReading.of_series(*one) for one in zip(*columns, strict=True)]
-    figures = charts.climate_figures(air)
-    return _spanned(since, until, figures, slice_s=round(air.slice_s, 3), items=items)
-
-
-def _draw_equipment(
-    found: Mapping[tuple[str, str], MeasurementSeries], since: float, until: float
-) -> bytes:
-    figures = {
-        "/".join(of): charts.measurement_figure(one) for of, one in found.items()
-    }
-    return _spanned(since, until, figures)
-
-
-def _spanned(
-    since: float, until: float, figures: Mapping[str, bytes], **other: object
-) -> bytes:
-    """The answer about a range: figures by name, and what else there is."""
+    drawn = draw(*facts)
     return write_json(
         {
             "since": format_stamp(since),
             "until": format_stamp(until),
-            **other,
-            **charts.library_facts(),
-            "figures": {name: Fragment(drawn) for name, drawn in figures.items()},
+            "figures": {name: Fragment(figure) for name, figure in drawn.items()},
         }
     )
 
@@ -261,8 +232,8 @@ def _by_transport(took: list[ByTransport]) -> dict[TransportId, LatencySpread]:
 
 
 _DAY = timedelta(days=1)
-_MOST_DECISIONS = 20 * MOST_ROWS
-"""So many are read; a day with more is told by those."""
+_MOST_RECORDS = 20 * MOST_ROWS
+"""So many are read of a day; one with more is told by those."""
 ReadDay = Callable[[date, float], Awaitable[Day]]
 """Has one day read from the history, as far as it has gone (Unix s)."""
 
@@ -283,7 +254,9 @@ async def _read(queries: Queries, greenhouse: Greenhouse, day: date, now: float)
     poses = await queries.ask(poses_of, since, until)
     seen = await queries.ask(people_seen, since, until)
     worked = worked_minutes(poses, greenhouse)
-    decisions = await _decisions(queries, since, until)
+    decisions = await _records(queries, DECISIONS, since, until)
+    orders = await _records(queries, COMMANDS, since, until)
+    stops = [one for one in reversed(orders) if one.kind == "stop"]
     slowed = slowed_minutes(decisions, greenhouse, until)
     by_name = [
         Worked(lane=lane, robot_id=robot, minutes=robots[robot])
@@ -303,30 +276,23 @@ async def _read(queries: Queries, greenhouse: Greenhouse, day: date, now: float)
         slowed=by_length,
         encounters=Encounters.from_value(encounter_counts(decisions)),
         passes=[_pass(one) for one in closest_passes(poses, seen, greenhouse)],
-        stops=[Command.from_record(one) for one in await _stops(queries, since, until)],
+        stops=[Command.from_record(one) for one in stops],
         unseen=len(await queries.unseen_alerts(MOST_KEPT)),
         lost=list(await queries.ask(lost_of, since, until)),
         map=GreenhouseMap.of(greenhouse),
     )
 
 
-async def _decisions(
-    queries: Queries, since: float, until: float
-) -> list[DecisionRecord]:
-    asked = Filter(since=since, until=until, limit=MOST_ROWS)
-    pages = queries.pages(DECISIONS, await queries.page(DECISIONS, asked), asked)
-    found: list[DecisionRecord] = []
-    async for page in pages:
+async def _records(
+    queries: Queries, listed: ListOf[R], since: float, until: float
+) -> list[R]:
+    wanted = Filter(since=since, until=until, limit=MOST_ROWS)
+    found: list[R] = []
+    async for page in queries.pages(listed, await queries.page(listed, wanted), wanted):
         found += page
-        if len(found) >= _MOST_DECISIONS:
+        if len(found) >= _MOST_RECORDS:
             break
     return found
-
-
-async def _stops(queries: Queries, since: float, until: float) -> list[CommandRecord]:
-    asked = Filter(since=since, until=until, limit=MOST_ROWS)
-    page = await queries.page(COMMANDS, asked)
-    return [one for one in reversed(page.items) if one.kind == "stop"]
 
 
 def _pass(one: Passing) -> Pass:

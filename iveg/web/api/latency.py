@@ -6,10 +6,10 @@ It is read in the loop from streams of measures, and written in the worker.
 import asyncio
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import orjson
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from iveg.domain.clock_offset import ClockOffset
@@ -37,8 +37,6 @@ from iveg.models.health import (
 )
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Apart
-from iveg.web.api.exports import MEDIA_TYPES, cell, csv_lines, form_of
-from iveg.web.pages import charts
 from iveg.web.pages.charts import cdf_figure
 from iveg.web.security.requirements import READERS, refusals
 
@@ -53,9 +51,6 @@ class Asked(BaseModel):
         None, pattern=r"^[A-Za-z0-9-]{1,64}$", description="Robot id; all unless told"
     )
     figures: bool = Field(True, description="Whether to draw the distributions, too")
-    format: Literal["json", "csv"] | None = Field(
-        None, description="Instead of an `Accept` header"
-    )
 
 
 def members_of(watch: LatencyWatch, asked: Asked, now: Instant) -> dict[str, object]:
@@ -87,21 +82,10 @@ def write_table(
         **members,
         direct=any(sketches[data, "uplink"].count for data in DATA),
         rows=[_row(data, sketches) for data in DATA],
-        **charts.library_facts(),
         figures=figures,
     )
     # Member by member, as only orjson knows what to do with a figure that is drawn.
     return write_json(vars(answer))
-
-
-def write_csv(sketches: Mapping[Cell, Sketch]) -> bytes:
-    """One line a kind of data and hop."""
-    names = list(SegmentSpread.model_fields)
-    rows = [["data", "hop", *names]]
-    for (data, hop), sketch in sketches.items():
-        spread = vars(_spread(sketch))
-        rows.append([data, hop, *(cell(spread[name]) for name in names)])
-    return csv_lines(rows)
 
 
 def _row(data: Data, sketches: Mapping[Cell, Sketch]) -> LatencyRow:
@@ -138,17 +122,10 @@ def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
         responses=refusals(503),
     )
 
-    @routes.get(
-        "/latency",
-        response_model=LatencyTable,
-        responses={200: {"content": {MEDIA_TYPES["csv"]: {}}}},
-    )
-    async def latency(request: Request, asked: Annotated[Asked, Query()]) -> Response:
+    @routes.get("/latency", response_model=LatencyTable)
+    async def latency(asked: Annotated[Asked, Query()]) -> Response:
         """Mean and quantiles of each hop, clocks, and the figure."""
         parts = collect(watch.streams, asked.window, asked.robot)
-        form = asked.format or form_of(request.headers)
-        if form == "csv":
-            return Response(write_csv(await asyncio.to_thread(merge, parts)), 200, _CSV)
         members = members_of(watch, asked, clock())
         # A day of twenty robots is merged in a thread, as sending all of it to the
         # worker costs more; the figure of the sums is drawn there.
@@ -157,9 +134,3 @@ def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
         return Response(body, media_type="application/json")
 
     return routes
-
-
-_CSV = {
-    "Content-Type": "text/csv; charset=utf-8",
-    "Content-Disposition": 'attachment; filename="latency.csv"',
-}

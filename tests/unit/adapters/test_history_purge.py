@@ -13,7 +13,7 @@ from iveg.adapters.history.engine import upgrade, writing_engine
 from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, Store
-from iveg.adapters.history.series import people_seen, speed_series
+from iveg.adapters.history.series import SPEEDS, people_seen, series_of
 from iveg.adapters.history.tables import TABLE_MAPPINGS
 from iveg.adapters.history.upkeep import RecordedHistory, purge_piece, recorded_days
 from iveg.adapters.journal import FileJournal
@@ -237,9 +237,9 @@ async def test_a_purge_beside_recording_loses_no_row(
     with contextlib.suppress(asyncio.CancelledError):
         await writing
     await recorder.close()
-    (found,) = await queries.ask(speed_series, 0.0, NOON * 2)
+    found = await queries.ask(series_of, SPEEDS, NOON, NOON + 0.5 * SPEEDS.most)
     assert (taken, recorder.counters["history_written"]) == (1000, recorded)
-    assert [*found.at] == [NOON + n for n in range(recorded)]
+    assert [*found["AGI",].at] == [NOON + n for n in range(recorded)]
 
 
 def test_days_of_the_log_are_found_newest_first(

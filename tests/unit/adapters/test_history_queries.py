@@ -7,11 +7,7 @@ from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Cursor, Filter, read_cursor, write_cursor
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Store
-from iveg.adapters.history.series import (
-    climate_series,
-    confidence_counts,
-    speed_series,
-)
+from iveg.adapters.history.series import AIR, SPEEDS, confidence_counts, series_of
 from iveg.domain.errors import UnreadableError
 from iveg.domain.records import DetectionRecord, Record
 from iveg.vital.record import Waiting
@@ -172,21 +168,19 @@ async def test_a_long_series_is_thinned_and_keeps_a_short_slow_down(
     queries: Queries, database_url: str
 ) -> None:
     rows = [odometry_record(at=NOON + n / 2, linear=1.0) for n in range(5000)]
-    rows[2500] = replace(
-        rows[2500], limit_factor=0.5, applied_factor=0.0, margin_m=-0.4
-    )
-    rows[2499] = replace(rows[2499], margin_m=0.1)
+    rows[2500] = replace(rows[2500], limit_factor=0.5, margin_m=-0.4)
+    rows[2501] = replace(rows[2501], margin_m=0.1)
     remember(database_url, *rows)
 
-    [series] = await queries.ask(speed_series, NOON, NOON + 2500)
+    found = await queries.ask(series_of, SPEEDS, NOON, NOON + 2500)
 
+    series = found["AGI",]
     assert 1000 < len(series.at) <= 2000
     assert list(series.at) == sorted(series.at)
-    assert series.limit.count(0.5) == 1
-    assert series.applied.count(0.0) == 1
-    assert [one for one in series.margin if one is not None] == [-0.4]
-    assert set(series.linear) == {1.0}
-    assert series.slice_s == pytest.approx(2499.5 / 1999)
+    assert series.values["limit_factor"].count(0.5) == 1
+    assert [one for one in series.values["margin_m"] if one is not None] == [-0.4]
+    assert set(series.values["linear"]) == {1.0}
+    assert series.slice_s == 1.25
 
 
 async def test_a_day_of_the_air_is_means_of_five_minutes(
@@ -195,10 +189,11 @@ async def test_a_day_of_the_air_is_means_of_five_minutes(
     rows = [climate_record(at=NOON + 60 * n, co2=400 + n % 5) for n in range(1440)]
     remember(database_url, *rows)
 
-    found = await queries.ask(climate_series, NOON, NOON + 86_400)
+    found = await queries.ask(series_of, AIR, NOON, NOON + 86_400)
 
-    assert (len(found.at), found.slice_s) == (288, 300.0)
-    assert set(found.co2) == {402.0}
+    air = found[()]
+    assert (len(air.at), air.slice_s) == (288, 300.0)
+    assert set(air.values["co2"]) == {402.0}
 
 
 async def test_detections_are_counted_by_class_and_confidence(
@@ -215,11 +210,5 @@ async def test_detections_are_counted_by_class_and_confidence(
     found = await queries.ask(confidence_counts, NOON, NOON + 1)
     of_agii = await queries.ask(confidence_counts, NOON, NOON + 1, "AGII")
 
-    assert [(c.class_id, c.least, c.count) for c in found] == [
-        ("AGII", 0.8, 1),
-        ("farmer", 0.0, 2),
-        ("farmer", 0.05, 1),
-        ("farmer", 0.8, 2),
-        ("farmer", 0.95, 2),
-    ]
-    assert [c.class_id for c in of_agii] == ["AGII"]
+    assert found == {"AGII": {16: 1}, "farmer": {0: 2, 1: 1, 16: 2, 19: 2}}
+    assert of_agii == {"AGII": {16: 1}}

@@ -2,7 +2,7 @@
  * The Climate page: three readings, their age, and their last 24 hours.
  *
  * @typedef {"temperature" | "humidity" | "co2"} Part
- * @typedef {import("./trends.js").Day & {slice_s: number,
+ * @typedef {import("./trends.js").Day & {
  *   figures: Record<Part, import("./history/charts.js").Figure>}} Day
  */
 
@@ -69,7 +69,7 @@ function createDay(i18n) {
     const heard = PARTS.filter((part) => day.figures[part].data.length);
     setHidden(need("#trend-empty"), heard.length > 0);
     setHidden(need("#trends"), heard.length === 0);
-    setText(need("#trend-note"), heard.length ? noteOf(day) : "");
+    setText(need("#trend-note"), heard.length ? noteOf(day.figures[heard[0]]) : "");
     for (const part of PARTS) {
       const figure = day.figures[part];
       setHidden(need(`#trend-${part}`), figure.data.length === 0);
@@ -81,8 +81,9 @@ function createDay(i18n) {
     }));
   }
 
-  /** @param {Day} shown */
-  function noteOf({ slice_s }) {
+  /** @param {import("./history/charts.js").Figure} figure */
+  function noteOf({ data: [line] }) {
+    const { slice_s } = line.meta;
     const minutes = slice_s / 60;
     return i18n.t(`climate.note.${slice_s ? "sliced" : "exact"}`, { minutes });
   }

@@ -71,7 +71,7 @@ async function start() {
   /** @param {Asked} wanted @param {AbortSignal} signal */
   async function show(wanted, signal) {
     const query = queryOf(wanted);
-    const [figures, decisions, commands] = await Promise.all([
+    const [{ figures }, decisions, commands] = await Promise.all([
       read(`history/charts?${query}`, signal),
       read(`decisions?${query}&limit=${ROWS}`, signal),
       read(`commands?${query}&limit=${ROWS}`, signal),

@@ -24,12 +24,11 @@ const DASHES = /** @type {Record<string, string>} */ ({
 
 /**
  * @param {HTMLElement} place @param {Figure} figure
- * @param {import("./history/charts.js").Source} source
  * @param {import("../core/i18n.js").I18n} i18n
  * @throws {Error} the library could not be loaded
  */
-export async function drawHopFigure(place, { data, layout }, source, i18n) {
-  const plotly = await readyPlotly(source);
+export async function drawHopFigure(place, { data, layout }, i18n) {
+  const plotly = await readyPlotly();
   const traces = data.map((trace) => dressed(trace, i18n));
   const laid = styled(layout, { since: 0, until: 0 }, i18n);
   await plotly.react(place, traces, laid, CONFIG);

@@ -70,8 +70,6 @@ export function start({ i18n }) {
     for (const chip of all("[data-of]")) {
       setAttribute(chip, "aria-pressed", String(chip.dataset.of === asked.robot));
     }
-    const csv = /** @type {HTMLAnchorElement} */ (need("#hops-csv"));
-    csv.href = `/api/v1/latency?format=csv&${queryOf(asked)}`;
     redraw();
   }
 
@@ -167,7 +165,7 @@ async function drawFigure(told, i18n) {
   setText(need("#hops-cdf-says"), i18n.t(isEmpty ? "hops.nothing" : "hops.note.cdf"));
   if (isEmpty) return;
   try {
-    await drawHopFigure(place, figure, told, i18n);
+    await drawHopFigure(place, figure, i18n);
   } catch {
     setHidden(need("#hops-error"), false);
     setText(need("#hops-error"), i18n.t("history.error.library"));

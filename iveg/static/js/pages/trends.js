@@ -3,7 +3,7 @@
  * while the page is visible, and drawn anew in another language or theme.
  *
  * @typedef {import("./history/charts.js").Figure} Figure
- * @typedef {import("./history/charts.js").Source & {since: string, until: string}} Day
+ * @typedef {{since: string, until: string}} Day
  * @typedef {import("../core/i18n.js").I18n} I18n
  */
 
@@ -65,7 +65,7 @@ async function areDrawn(figures, day, i18n) {
   const span = { since: Date.parse(day.since), until: Date.parse(day.until) };
   try {
     for (const { place, figure } of figures)
-      await drawFigure(place, figure, day, span, i18n);
+      await drawFigure(place, figure, span, i18n);
     return true;
   } catch {
     return false;

@@ -1,8 +1,5 @@
 import csv
-import gzip
-import importlib.resources
 import io
-import re
 import sqlite3
 from collections.abc import AsyncIterator
 from contextlib import closing
@@ -22,7 +19,6 @@ from iveg.vital.record import Waiting
 from iveg.web import problems
 from iveg.web.api import exports
 from iveg.web.api.history import router
-from iveg.web.pages import charts
 from iveg.web.security.requirements import require
 from tests.databases import lay_history
 from tests.fakes.records import (
@@ -255,9 +251,9 @@ async def test_charts_show_the_last_quarter_of_an_hour(
         command_record(standstill_ms=412.0),
     )
 
-    figures = (await client.get("/api/v1/history/charts")).json()
+    figures = (await client.get("/api/v1/history/charts")).json()["figures"]
 
-    speed, limit = figures["speed"]["data"]
+    speed, limit = figures["speed/AGI"]["data"]
     assert speed["meta"] == {"kind": "speed", "robot": "AGI", "slice_s": 0.0}
     assert speed["y"] == [0.9, 0.4, None, 0.0]
     assert speed["x"][0] == 1000.0 * NOON
@@ -270,7 +266,7 @@ async def test_charts_show_the_last_quarter_of_an_hour(
     assert (standing["name"], standing["y"]) == ("standstill", [412.0])
 
 
-async def test_the_air_of_a_day_is_readings_and_figures(
+async def test_the_air_of_a_day_is_drawn_with_its_gaps(
     client: Client, past: Past
 ) -> None:
     past.holds(
@@ -281,56 +277,14 @@ async def test_the_air_of_a_day_is_readings_and_figures(
 
     air = (await client.get("/api/v1/history/climate")).json()
 
-    assert [item["temperature"] for item in air["items"]] == [16.25, 21.5]
-    assert air["items"][1]["at"] == "2023-11-14T22:13:20.000Z"
-    assert (air["until"], air["slice_s"]) == ("2023-11-14T22:14:20.000Z", 0.0)
+    assert air["until"] == "2023-11-14T22:14:20.000Z"
     # The line breaks between readings that are an hour apart.
     [warmth] = air["figures"]["temperature"]["data"]
     assert warmth["y"] == [16.25, None, 21.5]
+    assert warmth["meta"]["slice_s"] == 300.0
     [humidity] = air["figures"]["humidity"]["data"]
     assert humidity["y"] == [70.0, None, 70.0]
     assert air["figures"]["co2"]["data"] == []
-
-
-async def test_the_library_names_the_sheets_that_a_strict_page_refuses(
-    client: Client,
-) -> None:
-    air = (await client.get("/api/v1/history/climate")).json()
-    script = gzip.decompress(charts.library().packed)
-
-    assert "plotly.js-style-global" in air["style_ids"]
-    made = script.count(b'createElement("style")')
-    # One place makes those of Plotly itself, each other place its own.
-    assert len(air["style_ids"]) == made
-
-
-async def test_the_page_gets_plotly_from_this_server_and_keeps_it(
-    client: Client,
-) -> None:
-    address = (await client.get("/api/v1/history/charts")).json()["library"]
-
-    async with client.stream("GET", address) as answer:
-        raw = b"".join([part async for part in answer.aiter_raw()])
-
-    assert b"plotly.js (basic" in gzip.decompress(raw)[:100]
-    assert answer.headers["content-type"].startswith("text/javascript")
-    assert "immutable" in answer.headers["cache-control"]
-    other = await client.get("/vendor/plotly-0.min.js")
-    assert other.status_code == 404
-
-
-def test_the_browser_draws_with_the_version_that_checks_the_figures() -> None:
-    drawing = gzip.decompress(charts.library().packed)
-    package = importlib.resources.files("plotly") / "package_data" / "plotly.min.js"
-    checking = package.read_bytes()
-
-    assert _version(drawing) == _version(checking)
-
-
-def _version(script: bytes) -> str:
-    found = re.search(rb"v(\d+\.\d+\.\d+)", script[:100])
-    assert found is not None
-    return found[1].decode()
 
 
 async def test_a_database_that_is_away_is_a_problem_and_not_a_crash(

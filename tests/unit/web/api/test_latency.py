@@ -1,7 +1,5 @@
 """The latency API: the paper's table live, honest about clocks."""
 
-import csv
-import io
 from typing import Any
 
 import pytest
@@ -68,18 +66,3 @@ async def test_what_the_paper_printed_stands_beside_it() -> None:
         "total_p95": 316.5,
     }
     assert paper["simulation"]["lidar"]["total_p95"] == 168.5
-
-
-async def test_the_table_comes_as_csv_for_whoever_likes_that() -> None:
-    desk = WebDesk()
-    drive(desk, 2.0)
-    async with desk.program() as program:
-        asked = await program.get("/api/v1/latency?window=1min&format=csv")
-        liked = await program.get("/api/v1/latency", headers={"Accept": "text/csv"})
-
-    lines = list(csv.DictReader(io.StringIO(asked.text)))
-    assert asked.headers["content-type"].startswith("text/csv")
-    assert len(lines) == 15
-    assert lines[0]["data"] == "odometry"
-    assert (lines[0]["hop"], lines[0]["count"]) == ("uplink", "40")
-    assert liked.text.splitlines()[0] == asked.text.splitlines()[0]

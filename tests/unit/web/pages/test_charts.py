@@ -1,49 +1,65 @@
-"""Rows become figures: strips, shades and gaps."""
+"""Rows become figures: shades and gaps, and the script that draws them."""
 
-from dataclasses import replace
+import importlib.resources
+import re
 
 import orjson
 
-from iveg.adapters.history.series import SpeedSeries
+from iveg.adapters.history.series import Series
 from iveg.domain.fleet import FleetDescription
 from iveg.web.pages import charts
 
+STATIC = importlib.resources.files("iveg") / "static"
+SCRIPT = (STATIC / "vendor/plotly-basic.min.js").read_bytes()
 
-def test_13_19_each_robot_has_a_strip_whose_slow_downs_are_shaded() -> None:
-    slowed = SpeedSeries(
-        "AGI",
-        at=(10.0, 11.0, 12.0, 13.0),
-        linear=(0.8, 0.4, 0.4, 0.8),
-        limit=(1.0, 0.5, 0.5, 1.0),
-        applied=(1.0, 0.5, 0.5, 1.0),
-        margin=(None,) * 4,
-        slice_s=0.0,
-    )
-    free = replace(slowed, robot_id="AGII", limit=(1.0,) * 4)
-    fleet = FleetDescription.undescribed(["AGI", "AGII"])
 
-    figure = orjson.loads(charts.speed_figure([slowed, free], fleet))
+def test_the_slow_downs_of_a_robot_are_shaded() -> None:
+    values = {
+        "linear": (0.8, 0.4, 0.4, 0.8),
+        "limit_factor": (1.0, 0.5, 0.5, 1.0),
+        "margin_m": (None,) * 4,
+    }
+    slowed = Series((10.0, 11.0, 12.0, 13.0), values)
+    fleet = FleetDescription.undescribed(["AGI"])
 
-    axes = [trace["yaxis"] for trace in figure["data"]]
-    assert axes == ["y", "y", "y2", "y2"]
-    layout = figure["layout"]
-    assert layout["yaxis2"]["domain"][1] < layout["yaxis"]["domain"][0]
-    (slow,) = layout["shapes"]
+    figure = orjson.loads(charts.speed_figure("AGI", slowed, fleet))
+
+    (slow,) = figure["layout"]["shapes"]
     assert (slow["yref"], slow["x0"], slow["x1"]) == ("y domain", 11_000.0, 13_000.0)
 
 
-def test_28_6_a_margin_is_drawn_as_long_as_it_was_measured_and_no_longer() -> None:
-    at = (0.0, 0.5, 1.0, 1.5, 9.0, 9.5)
+def test_a_margin_has_gaps_where_it_was_not_known() -> None:
     margin = (2.0, 1.5, None, -0.5, 3.0, None)
-    same = (1.0,) * len(at)
-    measured = SpeedSeries("AGI", at, same, same, same, margin)
-    unknown = replace(measured, robot_id="AGII", margin=(None,) * len(at))
+    measured = Series((0.0, 0.5, 1.0, 1.5, 9.0, 9.5), {"margin_m": margin})
+    unknown = Series((0.0, 0.5), {"margin_m": (None, None)})
 
-    (line,) = orjson.loads(charts.margin_figure([measured, unknown]))["data"]
+    figure = orjson.loads(charts.margin_figure({"AGI": measured, "AGII": unknown}))
 
+    (line,) = figure["data"]
     assert (line["meta"]["robot"], line["connectgaps"]) == ("AGI", False)
     assert [*zip(line["x"], line["y"], strict=True)] == [
-        *((0.0, 2.0), (500.0, 1.5), (1000.0, 1.5), (1000.0, None)),
-        *((1500.0, -0.5), (2000.0, -0.5), (2000.0, None)),
-        *((9000.0, 3.0), (9500.0, 3.0), (9500.0, None)),
+        *((0.0, 2.0), (500.0, 1.5), (1000.0, None), (1500.0, -0.5)),
+        *((1500.0, None), (9000.0, 3.0), (9500.0, None)),
     ]
+
+
+def test_the_page_keeps_the_script_from_sheets_that_its_policy_refuses() -> None:
+    page = (STATIC / "js/pages/history/charts.js").read_text()
+    own = {one.decode() for one in re.findall(rb'ById\("([0-9a-f]{64})"\)', SCRIPT)}
+
+    # One place makes those of Plotly itself, each other place its own.
+    assert SCRIPT.count(b'createElement("style")') == 1 + len(own)
+    assert all(f'"{one}"' in page for one in own | {"plotly.js-style-global"})
+
+
+def test_the_browser_draws_with_the_version_that_checks_the_figures() -> None:
+    package = importlib.resources.files("plotly") / "package_data" / "plotly.min.js"
+
+    assert b"plotly.js (basic" in SCRIPT[:100]
+    assert _version(SCRIPT) == _version(package.read_bytes())
+
+
+def _version(script: bytes) -> str:
+    found = re.search(rb"v(\d+\.\d+\.\d+)", script[:100])
+    assert found is not None
+    return found[1].decode()

@@ -1,9 +1,8 @@
 /**
  * The server's figures, in this page's colours and language.
  *
- * The library is large and comes from this server; it is asked for with the first
- * figure.  The library and each figure wait until the page rests, each in a task of its
- * own.  It styles a plot by sheets that a strict policy refuses, so an element of
+ * Plotly is large and is asked for with the first figure.  It and each figure wait until
+ * the page rests, each in a task of its own.  It styles a plot by sheets that a strict policy refuses, so an element of
  * each sheet's name keeps it from trying, and the style sheet of pages with figures has
  * the rules for a plot.  A figure's `meta` describes its traces and axes.
  *
@@ -12,8 +11,7 @@
  *   marker?: object}} Trace
  * @typedef {{data: Trace[], layout: Record<string, any>}} Figure
  * @typedef {"speed" | "margin" | "detections" | "stops"} ChartName
- * @typedef {{library: string, style_ids: string[]}} Source where the library is
- * @typedef {Source & Record<ChartName, Figure>} Charts
+ * @typedef {Record<string, Figure>} Charts by name; `speed/{robot}` for each robot
  * @typedef {{since: number, until: number}} Span Unix milliseconds
  */
 
@@ -21,7 +19,7 @@ import { whenResting } from "../../core/rest.js";
 import { all, make, need, setHidden, setText } from "../../panels/dom.js";
 import { wallText } from "./local_time.js";
 import { fitPaper } from "./paper.js";
-import { keepInStep, placesIn, stripsOf } from "./strips.js";
+import { keepInStep, placesIn } from "./strips.js";
 
 /** @type {readonly ChartName[]} */
 export const CHARTS = ["speed", "margin", "detections", "stops"];
@@ -40,6 +38,13 @@ const SYMBOLS = {
   standstill: "square",
 };
 
+const LIBRARY = "/static/vendor/plotly-basic.min.js";
+/** Of the sheets that the library would make itself (tests/unit/web/pages/test_charts.py). */
+const STYLE_IDS = [
+  "plotly.js-style-global",
+  "9f215cf04c5486422605d13261cb87401f4e7763b6296af81e98efbc0130da53",
+];
+
 /** @type {Promise<any> | null} */
 let library = null;
 
@@ -52,30 +57,42 @@ let library = null;
  * @throws {Error} the library could not be loaded
  */
 export async function drawCharts(charts, asked, i18n) {
+  const strips = stripsOf(charts);
   for (const name of CHARTS) {
-    setText(need(`#chart-${name}-note`), noteOf(name, charts[name].data, i18n));
-    setHidden(need(`#chart-${name}`), charts[name].data.length === 0);
-    setHidden(need(`#chart-${name}-empty`), charts[name].data.length > 0);
+    const figures = name === "speed" ? strips : [charts[name]];
+    const data = figures.flatMap((figure) => figure.data);
+    setText(need(`#chart-${name}-note`), noteOf(name, data, i18n));
+    setHidden(need(`#chart-${name}`), data.length === 0);
+    setHidden(need(`#chart-${name}-empty`), data.length > 0);
   }
-  if (CHARTS.every((name) => charts[name].data.length === 0)) return;
   // The library's first drawing costs as much again as a small figure.
   for (const name of /** @type {const} */ (["stops", "detections", "margin"])) {
     if (charts[name].data.length === 0) continue;
-    await drawFigure(need(`#chart-${name}`), charts[name], charts, asked, i18n);
+    await drawFigure(need(`#chart-${name}`), charts[name], asked, i18n);
   }
-  if (charts.speed.data.length) await drawStrips(charts, asked, i18n);
+  if (strips.length) await drawStrips(strips, asked, i18n);
+}
+
+/** Figures of speed from the top down; the last one has the axis of time.
+ * @param {Charts} charts @returns {Figure[]} */
+function stripsOf(charts) {
+  const names = Object.keys(charts).filter((name) => name.startsWith("speed/"));
+  return names.map((name, index) => {
+    const { data, layout } = charts[name];
+    const meta = { ...layout.meta, isAbove: index < names.length - 1 };
+    return { data, layout: { ...layout, meta } };
+  });
 }
 
 /**
- * @param {Charts} charts @param {Span} span
+ * @param {Figure[]} strips @param {Span} span
  * @param {import("../../core/i18n.js").I18n} i18n
  */
-async function drawStrips(charts, span, i18n) {
-  const strips = stripsOf(charts.speed);
+async function drawStrips(strips, span, i18n) {
   const places = placesIn(need("#chart-speed"), strips.length);
   for (const [index, strip] of strips.entries())
-    await drawFigure(places[index], strip, charts, span, i18n);
-  keepInStep(await readyPlotly(charts), places);
+    await drawFigure(places[index], strip, span, i18n);
+  keepInStep(await readyPlotly(), places);
 }
 
 /**
@@ -83,13 +100,12 @@ async function drawStrips(charts, span, i18n) {
  *
  * @param {HTMLElement} place
  * @param {Figure} figure
- * @param {Source} source
  * @param {Span} span
  * @param {import("../../core/i18n.js").I18n} i18n
  * @throws {Error} the library could not be loaded
  */
-export async function drawFigure(place, { data, layout }, source, span, i18n) {
-  const plotly = await readyPlotly(source);
+export async function drawFigure(place, { data, layout }, span, i18n) {
+  const plotly = await readyPlotly();
   const traces = data.map((trace, index) => dressed(trace, index, i18n));
   await plotly.react(place, traces, styled(layout, span, i18n), CONFIG);
 }
@@ -97,11 +113,10 @@ export async function drawFigure(place, { data, layout }, source, span, i18n) {
 /**
  * The library, once the page rests.
  *
- * @param {Source} source
  * @throws {Error} it could not be loaded
  */
-export async function readyPlotly(source) {
-  library ??= summon(source);
+export async function readyPlotly() {
+  library ??= summon();
   try {
     const plotly = await library;
     await whenResting();
@@ -112,9 +127,8 @@ export async function readyPlotly(source) {
   }
 }
 
-/** @param {Source} source */
-async function summon(source) {
-  for (const id of source.style_ids) {
+async function summon() {
+  for (const id of STYLE_IDS) {
     const keeper = make("i", "no-inline-styles");
     keeper.id = id;
     keeper.hidden = true;
@@ -122,7 +136,7 @@ async function summon(source) {
   }
   fitPaper();
   await whenResting();
-  await import(source.library);
+  await import(LIBRARY);
   const plotly = /** @type {any} */ (globalThis).Plotly;
   await whenResting();
   await warmUp(plotly);

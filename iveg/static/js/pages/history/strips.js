@@ -1,41 +1,10 @@
 /**
- * A figure of strips, one below the other, as a figure for each: drawn one by one they
- * block the page no longer than one of them does, and each has room for its name.
- *
- * @typedef {import("./charts.js").Figure} Figure
+ * Strips of a chart, one below the other: a figure for each, drawn one by one, blocks the
+ * page no longer than one of them does, and each has room for its name.
  */
 
 import { whenResting } from "../../core/rest.js";
 import { all, make } from "../../panels/dom.js";
-
-/** @param {Figure} figure @returns {Figure[]} from the top down */
-export function stripsOf({ data, layout }) {
-  const axes = Object.keys(layout).filter((key) => /^yaxis\d*$/.test(key));
-  return axes.map((key, index) => {
-    const axis = key.replace("axis", "");
-    const isAbove = index < axes.length - 1;
-    const { domain, ...yaxis } = layout[key];
-    return {
-      data: data.filter((trace) => trace.yaxis === axis).map(onFirstAxis),
-      layout: {
-        meta: { ...layout.meta, isAbove },
-        showlegend: false,
-        xaxis: { ...layout.xaxis, anchor: "y" },
-        yaxis,
-        shapes: shapesOn(axis, layout.shapes ?? []),
-      },
-    };
-  });
-}
-
-/** @param {Figure["data"][number]} trace */
-const onFirstAxis = ({ yaxis, ...trace }) => trace;
-
-/** @param {string} axis @param {Record<string, any>[]} shapes */
-function shapesOn(axis, shapes) {
-  const mine = shapes.filter(({ yref }) => yref === `${axis} domain`);
-  return mine.map((shape) => ({ ...shape, yref: "y domain" }));
-}
 
 /**
  * One place for each strip.
