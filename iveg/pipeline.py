@@ -107,7 +107,7 @@ def build(
     goals = GoalDispatcher(core, commander.machines)
     equipment = EquipmentMonitor(core, Equipment(choices.tiles, ports.clock()))
     supervision.listen("live", changed=hub.changed, appended=hub.append)
-    supervision.listen("goals", goal_answered=goals.heard, ticked=goals.tick)
+    supervision.listen("goals", goal_answered=goals.take_answer, ticked=goals.tick)
     supervision.listen(
         "latency",
         arrived=latency.arrived,

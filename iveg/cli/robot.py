@@ -107,7 +107,7 @@ def _listen(
     endpoints = dds.endpoints()
     for topic, name in sensed_topics(config.full_topics).items():
         depth = 2 if TOPICS[topic].role == "picture" else 200
-        qos = config.qualities[topic].newest(depth)
+        qos = config.quality(topic).newest(depth)
         for form in forms_published(topic, name, endpoints):
             if (topic, form) not in readers:
                 readers[topic, form] = dds.reader(name, form, qos)
@@ -119,10 +119,10 @@ def run(call: CommandCall) -> int:
     if not names.is_robot_id(options.id):
         allowed = "1 to 64 letters, digits and hyphens, and no name of iVeg's own"
         raise SettingsError("--id", options.id, allowed)
-    config, classes = load_config(options, call.environment)
+    config = load_config(options, call.environment)
     network = network_of(config, call.environment, "iveg robot")
     if options.action == "check":
-        inputs = SensorInputs(config, classes, sim_time=options.sim_time)
+        inputs = SensorInputs(config, sim_time=options.sim_time)
         return asyncio.run(check(options.id, config, inputs, network, settings))
     if options.attended and broker_of(settings).host not in LOOPBACK:
         raise SettingsError(
@@ -131,14 +131,13 @@ def run(call: CommandCall) -> int:
     from iveg.adapters.files import lease
 
     with lease(call.data / "robots" / f"{options.id}.lease", options.id):
-        work = _ride(call, config, classes, network)
+        work = _ride(call, config, network)
         return run_until_stopped(work, until_eof=options.until_eof)
 
 
 async def _ride(
     call: CommandCall,
     config: RobotConfig,
-    classes: tuple[str, ...],
     network: DdsNetwork,
 ) -> None:
     from iveg.adapters.dds import Dds
@@ -155,7 +154,7 @@ async def _ride(
             options.id,
             config,
             dds,
-            SensorInputs(config, classes, sim_time=options.sim_time),
+            SensorInputs(config, sim_time=options.sim_time),
             node_settings(settings, call.data / "robots", plan),
             _profile(described, config),
         )

@@ -51,12 +51,10 @@ class GoalDispatcher:
     def __init__(self, core: Core, machines: Mapping[str, StopMachine]) -> None:
         self._world, self._greenhouse = core.world, core.greenhouse
         self._machines, self._event_log = machines, core.event_log
-        self._ports = {
-            way.id: port
-            for way, port in core.ports.transports.items()
-            if way.carries("resume")
-        }
-        self._new_id, self._clock = core.ports.new_id, core.ports.clock
+        self._ports = [
+            port for way, port in core.ports.transports.items() if way.carries("resume")
+        ]
+        self._new_id = core.ports.new_id
         self._goals: dict[str, FollowedGoal] = {}
         self._given: set[str] = set()
         """Ids of all goals of this run: what the history has of them is our own."""
@@ -111,14 +109,11 @@ class GoalDispatcher:
 
     # --- what comes back, and time ------------------------------------------------
 
-    def heard(self, answer: GoalAnswer, at: Instant, transport: TransportId) -> None:
-        """Take a robot's word of its goal; of a second transport its time alone."""
+    def take_answer(self, answer: GoalAnswer, at: Instant, _: TransportId) -> None:
+        """Take a robot's word of its goal; a copy of it changes nothing."""
         goal = self._goals.get(answer.robot_id)
         if goal is None or goal.goal.goal_id != answer.id:
             return
-        if transport not in goal.words:
-            goal = self._goals[answer.robot_id] = goal.heard_by(transport, at)
-            self._event_log.goal(goal, None, at)
         event = _EVENTS[answer.result]
         if event == "dropped" and goal.forgotten is None:
             self._goals[answer.robot_id] = replace(goal, forgotten=at)
@@ -193,39 +188,21 @@ class GoalDispatcher:
     # --- sending ------------------------------------------------------------------
 
     def _send(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
-        for transport, port in self._ports.items():
-            work = self._attempt(transport, port, robot_id, order)
+        for port in self._ports:
+            work = self._attempt(port, robot_id, order)
             task = asyncio.get_running_loop().create_task(work, name=f"goal-{robot_id}")
             self._tasks.add(task)
             task.add_done_callback(self._tasks.discard)
 
     async def _attempt(
-        self,
-        transport: TransportId,
-        port: CommandPort,
-        robot_id: str,
-        order: GoalOrder | CancelOrder,
+        self, port: CommandPort, robot_id: str, order: GoalOrder | CancelOrder
     ) -> None:
-        is_goal = isinstance(order, GoalOrder)
-        if is_goal and self._is_held(robot_id):
+        if isinstance(order, GoalOrder) and self._is_held(robot_id):
             return
-        left = self._clock()
         try:
             await port.goal(robot_id, order)
         except HopError as error:
             _log.info("goal of %s: %s", robot_id, error)
-            return
-        if isinstance(order, GoalOrder):
-            self._note_left(robot_id, order.goal.goal_id, transport, left)
-
-    def _note_left(
-        self, robot_id: str, goal_id: str, transport: TransportId, left: Instant
-    ) -> None:
-        """Record when a goal left; one that gave way to another keeps its row."""
-        goal = self._goals[robot_id]
-        if goal.goal.goal_id == goal_id:
-            goal = self._goals[robot_id] = goal.left_by(transport, left)
-            self._event_log.goal(goal, None, left)
 
     async def close(self) -> None:
         """Cancel the sends that are under way."""

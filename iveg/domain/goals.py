@@ -14,7 +14,7 @@ A pair without a row changes nothing: what has ended stays ended.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from iveg.domain.errors import CommandRefusedError
@@ -24,7 +24,6 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, SafetyReport
 from iveg.domain.robot_state import RobotState
-from iveg.domain.transports import TransportId
 
 GoalKind = Literal["here", "aisle", "return", "pause"]
 
@@ -218,7 +217,6 @@ class FollowedGoal:
         asked: When the robot was last asked something: goal or cancellation.
         why: Code of the robot's refusal.
         forgotten: When the robot itself first said that it drives to it no longer.
-        left: When each transport took it; ``words`` the robot's first word by each.
     """
 
     robot_id: str
@@ -232,8 +230,6 @@ class FollowedGoal:
     answered: Instant | None = None
     ended: Instant | None = None
     forgotten: Instant | None = None
-    left: Mapping[TransportId, Instant] = field(default_factory=dict)
-    words: Mapping[TransportId, Instant] = field(default_factory=dict)
 
     @property
     def is_open(self) -> bool:
@@ -256,14 +252,6 @@ class FollowedGoal:
             answered=at if is_word and self.answered is None else self.answered,
             ended=None if state in OPEN_STATES else at,
         )
-
-    def left_by(self, transport: TransportId, at: Instant) -> "FollowedGoal":
-        """Note that a transport took it."""
-        return replace(self, left={transport: at, **self.left})
-
-    def heard_by(self, transport: TransportId, at: Instant) -> "FollowedGoal":
-        """Note the robot's word by a transport; the first one counts."""
-        return replace(self, words={transport: at, **self.words})
 
     def is_overdue(self, now: Instant) -> bool:
         """Whether what was asked last can be answered no more."""

@@ -198,8 +198,6 @@ class EventLog:
             state=goal.state,
             requested_by=goal.by,
             requested_at=goal.sent.wall,
-            sent_at={one: at.wall for one, at in goal.left.items()},
-            answer_at={one: at.wall for one, at in goal.words.items()},
             tries=1,
             reason=goal.why,
             goal={"kind": meant.kind, "x": meant.x, "y": meant.y, "aisle": goal.aisle},

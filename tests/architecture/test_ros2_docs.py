@@ -8,6 +8,7 @@ import pytest
 from iveg import cli
 from iveg.cli.arguments import parser
 from iveg.robot.ros2.config import RobotConfig, read_config
+from iveg.robot.ros2.topics import TOPICS
 from tests.architecture import documents
 from tests.processes import ROOT
 
@@ -20,10 +21,13 @@ def test_the_robot_toml_of_the_page_says_the_defaults() -> None:
 
     config = read_config(text, "docs/robots.md")
 
-    assert config.topics == RobotConfig().topics
+    assert config.full_topics == RobotConfig().full_topics
     assert config.frames == RobotConfig().frames
-    assert config.qualities == RobotConfig().qualities
-    assert (config.tf_max_age_s, config.p_min) == (0.5, 0.8)
+    assert all(config.quality(key) == RobotConfig().quality(key) for key in TOPICS)
+    assert (config.transforms, config.detector) == (
+        RobotConfig().transforms,
+        RobotConfig().detector,
+    )
 
 
 def test_every_word_of_the_command_line_is_in_the_contract() -> None:

@@ -69,7 +69,7 @@ def _network(options: argparse.Namespace) -> "AbstractContextManager[Dds | None]
         return nullcontext()
     from iveg.cli.nodes import load_config, network_of
 
-    config, _ = load_config(options, os.environ)
+    config = load_config(options, os.environ)
     network = network_of(config, os.environ, "iveg emulator --dds")
     from iveg.adapters.dds import Dds
 

@@ -40,7 +40,7 @@ from iveg.robot.node import (
     every,
     in_slots,
 )
-from iveg.robot.ros2.config import RobotConfig
+from iveg.robot.ros2.config import RobotConfig, RosTable
 from iveg.robot.ros2.outputs import Network
 from iveg.ros2.names import namespace_of
 
@@ -349,7 +349,9 @@ class SimulatedFleet:
             if network is None:
                 self._robots[robot_id] = EmulatedRobot(rig, world, settings)
             else:
-                config = RobotConfig(namespace=f"/{namespace_of(robot_id)}")
+                config = RobotConfig(
+                    ros=RosTable(namespace=f"/{namespace_of(robot_id)}")
+                )
                 self._robots[robot_id] = Ros2Base(
                     rig, world, network, config, settings.rate_hz
                 )

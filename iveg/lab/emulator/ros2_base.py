@@ -111,15 +111,15 @@ class Ros2Base:
         names = config.full_topics
 
         def writer(topic: str, message: type[Message]) -> Writer:
-            return network.writer(names[topic], message, config.qualities[topic])
+            return network.writer(names[topic], message, config.quality(topic))
 
         self._commands = network.reader(
             names["cmd_vel_out"],
             ros.Twist,
-            config.qualities["cmd_vel_out"].newest(50),
+            config.quality("cmd_vel_out").newest(50),
         )
         self._goals = network.reader(
-            names["goal"], ros.PoseStamped, config.qualities["goal"].newest()
+            names["goal"], ros.PoseStamped, config.quality("goal").newest()
         )
         self._wishes = writer("cmd_vel_in", ros.Twist)
         self._tf, self._tf_static = (

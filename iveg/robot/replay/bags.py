@@ -254,9 +254,9 @@ class BagPass:
             self._places.add(links, static=True)
         names = {use.role: name for name, use in uses.items()}
         seen = names.get("detections", "")
-        self._boxes = Boxes(seen, (), self._places, self._lost)
+        self._boxes = Boxes(seen, self._places, self._lost)
         called = {"detections_2d": seen, "depth": names.get("depth", "")}
-        self._camera = Camera(called, (), GROUNDING, self._places, self._lost)
+        self._camera = Camera(called, GROUNDING, self._places, self._lost)
         self._works: dict[str, Callable[[Any, Instant], BagObservation | None]] = {
             "odometry": self._odometry,
             "scan": self._scan,
@@ -344,7 +344,7 @@ class BagTree:
         odom, base = odom or usual.odom, base or usual.base_link
         if usual.base_link in self._up(base) or base in self._up(usual.base_link):
             base = usual.base_link  # odometry of a footprint
-        self.frames = Frames(usual.map, odom, base)
+        self.frames = usual.model_copy(update={"odom": odom, "base_link": base})
         self.lacks_base = not {odom, usual.map} & set(self._up(base))
         self.links = [*static]
         if usual.map not in self._up(odom):

@@ -51,7 +51,7 @@ class Lookout:
         """A base that cannot hear the gate obeys no STOP either."""
         out = self._names["cmd_vel_out"]
         message = message_of(stamped=self._config.drive.stamped_out)
-        offered = self._config.qualities["cmd_vel_out"]
+        offered = self._config.quality("cmd_vel_out")
         readers = [one for one in others if one.topic == out and not one.writes]
         for reader in readers:
             why = deafness(reader, message, offered)
@@ -216,7 +216,7 @@ def _badness(
         form = row.form(one.type)
         if form and one.type_hash not in ("", *map(type_hash, definitions(form))):
             return f"other fields: {one.type_hash} there, {type_hash(form)} here"
-        if not config.qualities[topic].hears(one.qos):
+        if not config.quality(topic).hears(one.qos):
             return f"another quality of service is asked for: qos.{topic}"
     if rate_hz < _LEAST_HZ.get(topic, 0.0):
         return "slow" if rate_hz else "silent"

@@ -170,7 +170,6 @@ class Boxes:
 
     Args:
         topic: Its full name, for faults.
-        classes: A detector's class names by number; none: as sent.
         places: Transforms of the robot.
         input_faults: Record of faults.
     """
@@ -178,12 +177,10 @@ class Boxes:
     def __init__(
         self,
         topic: str,
-        classes: tuple[str, ...],
         places: Places,
         input_faults: InputFaults,
     ) -> None:
         self._topic = topic
-        self._classes = classes
         self._places = places
         self._input_faults = input_faults
 
@@ -205,12 +202,12 @@ class Boxes:
         """A detection, or that it has no place, and the class that it is of."""
         if place is not None:
             try:
-                found = reading.read_detection(one, place, self._classes)
+                found = reading.read_detection(one, place)
             except UnreadableError as error:
                 self._input_faults.note(error.reason, self._topic, now)
             else:
                 return found.class_id, found
-        return reading.class_id_of(one.results, self._classes), "unreadable"
+        return reading.class_id_of(one.results), "unreadable"
 
 
 # --- pictures ---------------------------------------------------------------------
@@ -295,7 +292,6 @@ def grounded(
     picture: DepthPicture,
     mask: ros.Image | None,
     place: RigidTransform,
-    classes: tuple[str, ...],
     settings: Grounding,
 ) -> DetectionFrame:
     """One detection frame with its boxes in ``map``.
@@ -305,7 +301,6 @@ def grounded(
         picture: Depth at that moment.
         mask: Detection of each pixel; None: the whole box.
         place: Pose of the camera's optical frame in ``map``.
-        classes: Names by number.
         settings: Parameters that the paper leaves open.
 
     Raises:
@@ -318,8 +313,8 @@ def grounded(
     owners = None if mask is None else _pixels(mask, _MASKS.get(mask.encoding, "u1"))
     answers = [
         (
-            class_id_of(one.results, classes),
-            _place(number, one, picture, owners, place, classes, settings),
+            class_id_of(one.results),
+            _place(number, one, picture, owners, place, settings),
         )
         for number, one in enumerate(look.detections, 1)
     ]
@@ -332,11 +327,10 @@ def _place(
     picture: DepthPicture,
     owners: NDArray[np.generic] | None,
     place: RigidTransform,
-    classes: tuple[str, ...],
     settings: Grounding,
 ) -> Detection | Ungrounded:
     try:
-        segment = _segment(number, seen, picture, owners, classes)
+        segment = _segment(number, seen, picture, owners)
         answer = ground(segment, picture, settings)
     except UnreadableError:
         return "unreadable"
@@ -351,9 +345,8 @@ def _segment(
     seen: ros.Detection2D,
     picture: DepthPicture,
     owners: NDArray[np.generic] | None,
-    classes: tuple[str, ...],
 ) -> Segment:
-    class_id, probability = read_hypothesis(seen.results, classes)
+    class_id, probability = read_hypothesis(seen.results)
     centre, box = seen.bbox.center.position, seen.bbox
     numbers = centre.x, centre.y, box.size_x, box.size_y
     if not all(map(np.isfinite, numbers)) or max(map(abs, numbers)) > EDGE_LIMIT:
@@ -407,7 +400,6 @@ class Camera:
 
     Args:
         names: Full names of topics, for faults.
-        classes: A detector's class names by number; none: as sent.
         settings: Parameters that the paper leaves open.
         places: Transforms of the robot.
         input_faults: Record of faults.
@@ -416,13 +408,11 @@ class Camera:
     def __init__(
         self,
         names: Mapping[str, str],
-        classes: tuple[str, ...],
         settings: Grounding,
         places: Places,
         input_faults: InputFaults,
     ) -> None:
         self._names = names
-        self._classes = classes
         self._settings = settings
         self._places = places
         self._input_faults = input_faults
@@ -463,7 +453,7 @@ class Camera:
         frame = None if depth is None else self._located(look, depth, now)
         if incomplete:
             self._input_faults.note("no_depth", self._names["detections_2d"], now)
-        lost = (class_id_of(one.results, self._classes) for one in look.detections)
+        lost = (class_id_of(one.results) for one in look.detections)
         return frame or DetectionFrame("", UNKNOWN_ORIGIN, (), tuple(lost))
 
     def _located(
@@ -477,7 +467,7 @@ class Camera:
         mask = nearest(self._masks, stamp, _SAME_PICTURE_S)
         try:
             picture = read_depth(depth, self._info)
-            return grounded(look, picture, mask, place, self._classes, self._settings)
+            return grounded(look, picture, mask, place, self._settings)
         except UnreadableError as error:
             self._input_faults.note(error.reason, self._names["depth"], now)
             return None

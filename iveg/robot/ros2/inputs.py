@@ -77,14 +77,12 @@ class SensorInputs:
 
     Args:
         config: Names of topics and frames.
-        classes: A detector's class names by number; none: as sent.
         sim_time: Stamps are a simulator's and are not compared with clocks.
     """
 
     def __init__(
         self,
         config: RobotConfig,
-        classes: tuple[str, ...] = (),
         *,
         sim_time: bool = False,
     ) -> None:
@@ -92,12 +90,12 @@ class SensorInputs:
         self._names = config.full_topics
         self._map = config.frames.map
         self._sim_time = sim_time
-        self._tf_max_age_s = config.tf_max_age_s
-        self._places = Places(config.frames, config.tf_max_age_s, faults)
-        grounding = Grounding(p_min=config.p_min)
-        self._camera = Camera(self._names, classes, grounding, self._places, faults)
+        self._tf_max_age_s = config.transforms.max_age_s
+        self._places = Places(config.frames, config.transforms.max_age_s, faults)
+        grounding = Grounding(p_min=config.detector.p_min)
+        self._camera = Camera(self._names, grounding, self._places, faults)
         boxes = self._names["detections_3d"]
-        self._boxes = Boxes(boxes, classes, self._places, faults)
+        self._boxes = Boxes(boxes, self._places, faults)
         self._stamps: defaultdict[str, Stamps] = defaultdict(Stamps)
         self._newest: dict[str, tuple[type[Message], bytes]] = {}
         self._used_at: dict[str, float] = {}

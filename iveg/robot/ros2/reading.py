@@ -132,20 +132,17 @@ def _side(laser: RigidTransform) -> int:
     raise UnreadableError("tilted_laser", f"{math.degrees(laser.tilt):.0f}°")
 
 
-def read_detection(
-    detection: ros.Detection3D, place: RigidTransform, classes: tuple[str, ...]
-) -> Detection:
+def read_detection(detection: ros.Detection3D, place: RigidTransform) -> Detection:
     """A box in ``map``: the hull of the rotated one.
 
     Args:
         detection: As it came.
         place: Pose of its frame in ``map``.
-        classes: Names by number; empty: as sent.
 
     Raises:
         UnreadableError: ``no_class``, ``bad_probability``, ``not_a_number``.
     """
-    class_id, probability = read_hypothesis(detection.results, classes)
+    class_id, probability = read_hypothesis(detection.results)
     centre, size = detection.bbox.center, detection.bbox.size
     box = rigid_of(centre.position, centre.orientation)
     sides = size.x, size.y, size.z
@@ -159,7 +156,7 @@ def read_detection(
 
 
 def read_hypothesis(
-    results: Sequence[ros.ObjectHypothesisWithPose], classes: tuple[str, ...]
+    results: Sequence[ros.ObjectHypothesisWithPose],
 ) -> tuple[str, float]:
     """Class and score of the most probable hypothesis.
 
@@ -174,21 +171,17 @@ def read_hypothesis(
     if not 0.0 <= best.score <= 1.0:
         raise UnreadableError("bad_probability", f"{best.score}")
     name = clean(best.class_id)
-    if name.isdecimal() and int(name) < len(classes):
-        name = clean(classes[int(name)])
     if not name:
         raise UnreadableError("no_class", "a class without a name")
     return name, best.score
 
 
-def class_id_of(
-    results: Sequence[ros.ObjectHypothesisWithPose], classes: tuple[str, ...]
-) -> str | None:
+def class_id_of(results: Sequence[ros.ObjectHypothesisWithPose]) -> str | None:
     """The only class that a detection may be of; None where it may be another."""
     if len(results) != 1:
         return None
     try:
-        return read_hypothesis(results, classes)[0]
+        return read_hypothesis(results)[0]
     except UnreadableError:
         return None
 

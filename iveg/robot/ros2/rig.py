@@ -103,7 +103,7 @@ class Ros2Robot:
         self._costmap = self._open_costmap(network)
 
     def _open(self, network: Network) -> None:
-        qualities, drive = self._config.qualities, self._config.drive
+        quality, drive = self._config.quality, self._config.drive
         self._subscriptions: list[_Subscription] = []
         for topic in sensed_topics(self._names):
             for form in TOPICS[topic].forms:
@@ -115,15 +115,15 @@ class Ros2Robot:
         self._wishes = network.reader(
             self._names["cmd_vel_in"],
             message_of(stamped=drive.stamped_in),
-            qualities["cmd_vel_in"].newest(),
+            quality("cmd_vel_in").newest(),
         )
         self._out = network.writer(
             self._names["cmd_vel_out"],
             message_of(stamped=drive.stamped_out),
-            qualities["cmd_vel_out"].newest(),
+            quality("cmd_vel_out").newest(),
         )
         self._goal, self._cloud, self._markers = (
-            network.writer(name, TOPICS[topic].message, qualities[topic].newest())
+            network.writer(name, TOPICS[topic].message, quality(topic).newest())
             if (name := self._names[topic])
             else None
             for topic in ("goal", "obstacles", "markers")
@@ -133,7 +133,7 @@ class Ros2Robot:
         name = self._names["costmap"]
         if not name:
             return None
-        quality = self._config.qualities["costmap"]
+        quality = self._config.quality("costmap")
         return CostmapTopic(
             network.writer(name, TOPICS["costmap"].message, quality),
             self._fleet_costmap,
@@ -143,7 +143,7 @@ class Ros2Robot:
         )
 
     def _listen(self, topic: str, form: type[Message]) -> None:
-        quality = self._config.qualities[topic]
+        quality = self._config.quality(topic)
         # Every transform counts; of all else the newest.
         qos = quality if TOPICS[topic].role == "transforms" else quality.newest()
         reader = self._network.reader(self._names[topic], form, qos)

@@ -26,10 +26,6 @@ class HereRequest(_Wish):
     x: _Metres
     y: _Metres
 
-    def wish(self) -> GoalWish:
-        """The goal that the person asked for."""
-        return GoalWish("here", self.x, self.y)
-
 
 class AisleRequest(_Wish):
     """An aisle by its label."""
@@ -37,19 +33,11 @@ class AisleRequest(_Wish):
     kind: Literal["aisle"]
     aisle: Annotated[str, Field(min_length=1, max_length=64)]
 
-    def wish(self) -> GoalWish:
-        """The goal that the person asked for."""
-        return GoalWish("aisle", aisle=self.aisle)
-
 
 class PlainRequest(_Wish):
     """Back to where the robot belongs, or stay where it is."""
 
     kind: Literal["return", "pause"]
-
-    def wish(self) -> GoalWish:
-        """The goal that the person asked for."""
-        return GoalWish(self.kind)
 
 
 GoalRequest = Annotated[
@@ -64,7 +52,12 @@ def router(goals: GoalDispatcher, clock: Clock) -> APIRouter:
     @routes.post("/robots/{robot_id}/goal", status_code=202, response_model=Goal)
     async def give(robot_id: str, body: GoalRequest, who: Operator) -> Response:
         """Send a robot somewhere; 409 while it is held or the place is not free."""
-        return Json(Goal.of(goals.give(robot_id, body.wish(), who.name, clock())), 202)
+        return Json(
+            Goal.of(
+                goals.give(robot_id, GoalWish(**body.model_dump()), who.name, clock())
+            ),
+            202,
+        )
 
     @routes.delete("/robots/{robot_id}/goal", status_code=202, response_model=Goal)
     async def cancel(robot_id: str, who: Operator) -> Response:

@@ -10,7 +10,7 @@ from iveg.cli import COMMANDS, robot
 from iveg.cli.arguments import CommandCall, parser
 from iveg.cli.nodes import load_config
 from iveg.cli.robot import refuse_second_gate
-from iveg.domain.errors import HopError, SettingsError
+from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.ros2 import messages as ros
 from iveg.settings import Settings
 from tests.fakes.ros2_network import FakeNetwork, endpoint
@@ -31,7 +31,7 @@ def test_an_id_that_iveg_cannot_know_is_refused(robot_id: str, tmp_path: Path) -
 
 @pytest.mark.parametrize("domain", ["233", "-1"])
 def test_a_domain_that_dds_does_not_have_is_refused(domain: str) -> None:
-    with pytest.raises(SettingsError, match="0 to 232"):
+    with pytest.raises(DataFileError, match=r"ros\.domain"):
         load_config(options(f"--ros-domain={domain}"), {})
 
 
@@ -39,19 +39,28 @@ def test_words_count_before_the_file_and_the_file_before_the_environment(
     tmp_path: Path,
 ) -> None:
     file = tmp_path / "robot.toml"
-    file.write_text('[ros]\ndomain = 7\nnamespace = "/a"\n[detector]\nclasses = "c"\n')
-    (tmp_path / "c").write_text("tomato\nfarmer\n")
+    file.write_text('[ros]\ndomain = 7\nnamespace = "/a"\n')
     environment = {"ROS_DOMAIN_ID": "9"}
     words = options("--config", str(file), "--namespace", "/b", "--cmd-vel-in", "/go")
 
-    config, classes = load_config(words, environment)
-    bare, _ = load_config(options(), environment)
-    worded, _ = load_config(options("--ros-domain", "3"), environment)
+    config = load_config(words, environment)
+    bare = load_config(options(), environment)
+    worded = load_config(options("--ros-domain", "3"), environment)
 
-    assert (config.domain, bare.domain, worded.domain) == (7, 9, 3)
+    assert (config.ros.domain, bare.ros.domain, worded.ros.domain) == (7, 9, 3)
     topics = config.full_topics
     assert (topics["odometry"], topics["cmd_vel_in"]) == ("/b/odom", "/go")
-    assert classes == ("tomato", "farmer")
+
+
+def test_a_class_list_of_an_earlier_file_is_named_and_not_read(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text('[detector]\nclasses = "yolox.txt"\n')
+
+    load_config(options("--config", str(file)), {})
+
+    assert "detector.classes is not read" in caplog.text
 
 
 def test_nobody_lets_a_robot_go_over_a_broker_that_is_not_here(

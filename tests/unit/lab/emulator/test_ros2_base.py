@@ -20,7 +20,7 @@ from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.ros2_base import TIMEOUT_S, DriveWatchdog, Ros2Base
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
-from iveg.robot.ros2.config import RobotConfig
+from iveg.robot.ros2.config import RobotConfig, RosTable
 from iveg.robot.ros2.inputs import SensorInputs
 from iveg.robot.ros2.topics import sensed_topics
 from iveg.ros2 import messages as ros
@@ -47,7 +47,7 @@ class Emulated:
         self.world = SimulatedWorld(greenhouse, layout, DETECTORS["perfect"], 1)
         self.rig = self.world.rigs["AGII"]
         self.network = FakeNetwork()
-        self.config = RobotConfig(namespace="/agii")
+        self.config = RobotConfig(ros=RosTable(namespace="/agii"))
         self.base = Ros2Base(self.rig, self.world, self.network, self.config, 30.0)
 
     def sensed(self) -> list[Observation]:

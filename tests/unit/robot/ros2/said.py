@@ -107,10 +107,9 @@ class Bench:
         config: RobotConfig | None = None,
         *,
         tree: bool = True,
-        classes: tuple[str, ...] = (),
         heard_for: float = 1.0,
     ) -> None:
-        self.inputs = SensorInputs(config or RobotConfig(), classes)
+        self.inputs = SensorInputs(config or RobotConfig())
         self.hear("tf", tf(), -heard_for)
         if tree:
             self.hear("tf_static", tf(link("base_link", "laser", 0.3)))

@@ -12,7 +12,7 @@ from iveg.robot.ros2.checking import (
     judge,
     lines,
 )
-from iveg.robot.ros2.config import DriveConfig, RobotConfig
+from iveg.robot.ros2.config import DriveConfig, QualityTable, RobotConfig
 from iveg.robot.ros2.reading import InputFaults, speed_of
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as ros
@@ -47,9 +47,7 @@ def faults(
         ),
         (
             BASE,
-            RobotConfig(
-                qualities={**RobotConfig().qualities, "cmd_vel_out": SENSOR_DATA}
-            ),
+            RobotConfig(qos={"cmd_vel_out": QualityTable(reliable=False)}),
             "/cmd_vel: best effort → reliable",
         ),
     ],
@@ -95,7 +93,7 @@ WHOLE = {
 RATES = {"odometry": 30.0, "scan": 10.0, "tf": 30.0, "detections_3d": 10.0}
 FOREIGN = Endpoint("/detections_3d", "darknet_msgs/msg/Boxes", True, DEFAULT, False)
 YOLACT = endpoint("/detections_3d", d.BoundingBoxes3d)
-CAMERA = RobotConfig(topics={**RobotConfig().topics, "detections_2d": "boxes"})
+CAMERA = RobotConfig(topics={"detections_2d": "boxes"})
 
 
 def wrong(

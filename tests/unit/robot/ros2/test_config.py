@@ -2,7 +2,7 @@
 
 import pytest
 
-from iveg.domain.errors import DataFileError, UnreadableError
+from iveg.domain.errors import DataFileError
 from iveg.robot.ros2.config import RobotConfig, read_config
 from iveg.ros2 import names
 from iveg.ros2.names import Qos
@@ -30,7 +30,6 @@ max_speed = 0.6
 max_age_s = 0.3
 
 [detector]
-classes = "yolox.txt"
 p_min = 0.5
 
 [qos.scan]
@@ -50,16 +49,16 @@ def test_without_a_word_everything_is_as_ros_does_it() -> None:
         "/tf",
         "/cmd_vel",
     ]
-    assert config.qualities["scan"] == Qos(reliable=False, depth=5)
-    assert config.qualities["tf_static"].transient_local
-    assert config.qualities["tf"].reliable
+    assert config.quality("scan") == Qos(reliable=False, depth=5)
+    assert config.quality("tf_static").transient_local
+    assert config.quality("tf").reliable
 
 
 def test_what_is_said_counts_and_the_rest_stays() -> None:
     config = read_config(WHOLE, "robot.toml")
 
     topics = config.full_topics
-    assert (config.domain, config.interface, config.peers) == (
+    assert (config.ros.domain, config.ros.interface, config.ros.peers) == (
         7,
         "eth0",
         ("10.0.0.5",),
@@ -71,9 +70,9 @@ def test_what_is_said_counts_and_the_rest_stays() -> None:
     assert (topics["tf"], topics["battery"]) == ("/tf", "")
     assert (config.frames.map, config.frames.odom) == ("world", "odom")
     assert (config.drive.stamped_in, config.drive.max_speed) == (True, 0.6)
-    assert (config.tf_max_age_s, config.p_min) == (0.3, 0.5)
-    assert config.qualities["scan"] == Qos(reliable=True, depth=2)
-    assert config.qualities["tf"] == names.TF
+    assert (config.transforms.max_age_s, config.detector.p_min) == (0.3, 0.5)
+    assert config.quality("scan") == Qos(reliable=True, depth=2)
+    assert config.quality("tf") == names.TF
 
 
 @pytest.mark.parametrize(
@@ -81,7 +80,7 @@ def test_what_is_said_counts_and_the_rest_stays() -> None:
     [
         ("[ros]\nnamespace = '/a b'\n", ", ros.namespace: '/a b' is not a ROS"),
         ("[topics]\nscan = '1scan'\n", ", topics.scan"),
-        ("[topics]\nscna = 'scan'\n", ", topics.scna: is unknown; known are"),
+        ("[topics]\nscna = 'scan'\n", ", topics.scna.[key]: is unknown; known are"),
         (
             "[drive]\nstamped_in = 1\n",
             ", drive.stamped_in: Input should be a valid bool",
@@ -100,5 +99,5 @@ def test_a_file_that_cannot_be_used_is_refused_with_its_key(
 
 
 def test_a_namespace_of_the_command_line_is_held_to_the_same_rule() -> None:
-    with pytest.raises(UnreadableError):
-        _ = RobotConfig(namespace="/a;b").full_topics
+    with pytest.raises(DataFileError, match=r"command line, ros\.namespace"):
+        RobotConfig().with_words({"namespace": "/a;b"}, {})

@@ -16,7 +16,6 @@ from tests.unit.robot.ros2.said import Bench, tf
 WIDTH, HEIGHT, FOCAL = 64, 48, 60.0
 PERSON, WALL = 3.0, 6.0
 TOPICS = {
-    **RobotConfig().topics,
     "detections_2d": "boxes",
     "depth": "depth",
     "camera_info": "info",

@@ -18,7 +18,7 @@ from iveg.domain.goals import Goal
 from iveg.domain.observations import Origin
 from iveg.robot.costmap import FleetCostmap
 from iveg.robot.node import NodeSettings
-from iveg.robot.ros2.config import RobotConfig
+from iveg.robot.ros2.config import RobotConfig, RosTable
 from iveg.robot.ros2.inputs import SensorInputs
 from iveg.robot.ros2.rig import Ros2Robot
 from iveg.ros2 import detector_messages as d
@@ -59,7 +59,7 @@ async def riding(folder: Path) -> AsyncIterator[Site]:
     network = FakeNetwork()
     address = BrokerAddress("127.0.0.1", port)
     settings = NodeSettings(address=address, apikey="iveg", directory=folder)
-    config = RobotConfig(namespace="/agi")
+    config = RobotConfig(ros=RosTable(namespace="/agi"))
     inputs = SensorInputs(config)
     robot = Ros2Robot("AGI", config, network, inputs, settings, AGI)
     task = asyncio.create_task(robot.run())
