@@ -49,7 +49,6 @@ def staged(
     parts = iveg.parts
     stage = Stage(
         world,
-        (),
         parts.ingest,
         parts.loop,
         iveg.feedback,

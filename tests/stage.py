@@ -47,15 +47,12 @@ class Stage:
     ) -> None:
         greenhouse = load_greenhouse(scenario_named(scenario).greenhouse)
         layout = lay_out(scenario_named(scenario), robots, greenhouse)
-        world = SimulatedWorld(
-            greenhouse, layout, DETECTORS[layout.detector or profile], seed
-        )
+        world = SimulatedWorld(greenhouse, layout, DETECTORS[profile], seed)
         self.desk = desk = Desk(robots, greenhouse)
         desk.evaluator.rule = replace(desk.evaluator.rule, foresight=foresight)
         self._views = Views(desk.parts)
         self._stage = staging.Stage(
             world,
-            layout.incidents,
             desk.ingest,
             desk.loop,
             desk.fleet.told,

@@ -1,9 +1,7 @@
 """The emulated fleet on a real broker, with a small iVeg that hears and answers."""
 
 import asyncio
-import json
 import logging
-from collections.abc import Sequence
 from pathlib import Path
 
 import httpx
@@ -18,8 +16,11 @@ from iveg.domain.observations import (
     Navigation,
     Odometry,
 )
+from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.fleet import FleetSettings, run_emulator
-from iveg.lab.emulator.orders import FaultOrder
+from iveg.lab.emulator.layout import lay_out
+from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.world import SimulatedWorld
 from iveg.robot.node import NodeSettings
 from tests.integration.emulator_cloud import Cloud, running, until
 from tests.patience import PATIENCE_S
@@ -38,37 +39,20 @@ class FaultPort:
     def opened(self, port: int) -> None:
         self.port = port
 
-    async def post(self, order: object, *, method: str = "POST") -> httpx.Response:
+    async def post(self, order: object) -> httpx.Response:
         async with httpx.AsyncClient(verify=NO_TLS, timeout=PATIENCE_S) as client:
-            url = f"http://127.0.0.1:{self.port}/"
-            return await client.request(method, url, content=json.dumps(order))
-
-
-def of_run(
-    address: BrokerAddress, folder: Path, *, held: bool = False
-) -> FleetSettings:
-    node = NodeSettings(address=address, apikey="iveg", directory=folder)
-    return FleetSettings(node, held=held)
+            return await client.post(f"http://127.0.0.1:{self.port}/", json=order)
 
 
 def emulator(
-    address: BrokerAddress,
-    folder: Path,
-    *,
-    scenario: str = "nlos",
-    robots: tuple[str, ...] = FLEET,
-    held: bool = False,
-    faults: Sequence[FaultOrder] = (),
-    port: FaultPort | None = None,
+    address: BrokerAddress, folder: Path, port: FaultPort | None = None
 ) -> asyncio.Task[None]:
+    layout = lay_out(scenario_named("nlos"), FLEET, TESTBED)
+    node = NodeSettings(address=address, apikey="iveg", directory=folder / "state")
     return asyncio.create_task(
         run_emulator(
-            robots,
-            TESTBED,
-            of_run(address, folder / "state", held=held),
-            scenario=scenario,
-            profile="perfect",
-            faults=faults,
+            SimulatedWorld(TESTBED, layout, DETECTORS["perfect"], seed=1),
+            FleetSettings(node),
             fault_port=None if port is None else 0,
             on_fault_port=(port or FaultPort()).opened,
         )
@@ -103,7 +87,7 @@ async def test_faults_are_done_as_ordered(
     address: BrokerAddress, cloud: Cloud, tmp_path: Path
 ) -> None:
     port = FaultPort()
-    async with running(emulator(address, tmp_path, port=port)):
+    async with running(emulator(address, tmp_path, port)):
         await until(lambda: cloud.speed("AGII") > 0.5)
 
         done = await port.post({"robot": "AGII", "local_hold": "hw"})
@@ -125,7 +109,7 @@ async def test_a_deaf_robot_drives_on_whatever_its_gate_says_and_holds_still_bit
 ) -> None:
     port = FaultPort()
     cloud.speed_limits["AGII"] = SpeedLimit(0.5, "person", "someone", 1.0)
-    async with running(emulator(address, tmp_path, port=port)):
+    async with running(emulator(address, tmp_path, port)):
         await until(lambda: cloud.speed("AGII") > 0.3)
         await port.post({"robot": "AGII", "deaf": True})
         await until(lambda: cloud.speed("AGII") > 0.6)

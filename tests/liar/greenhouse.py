@@ -84,7 +84,6 @@ class Field:
         )
         self.stage = Stage(
             self.world,
-            (),
             desk.ingest,
             desk.loop,
             desk.fleet.told,

@@ -25,7 +25,9 @@ def _add_emulator(emulator: argparse.ArgumentParser) -> None:
     )
     emulator.add_argument("--seed", type=int, default=1, metavar="S")
     emulator.add_argument(
-        "--profile", default="simulation", choices=("simulation", "field", "perfect")
+        "--profile",
+        default="simulation",
+        choices=("simulation", "field", "noisy", "perfect"),
     )
     emulator.add_argument(
         "--held", action="store_true", help="robots stay held after they boot"
@@ -36,13 +38,6 @@ def _add_emulator(emulator: argparse.ArgumentParser) -> None:
         default=30.0,
         metavar="RATE",
         help="of odometry, laser and camera each (default: 30)",
-    )
-    emulator.add_argument(
-        "--fault",
-        nargs="+",
-        default=[],
-        metavar="[ROBOT:]FIELD=VALUE",
-        help="what is wrong from the start, such as stuck=true AGI:deaf=true",
     )
     emulator.add_argument(
         "--fault-port", type=int, metavar="PORT", help="take fault orders over HTTP"

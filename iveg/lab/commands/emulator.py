@@ -14,8 +14,11 @@ from iveg.cli.arguments import CommandCall
 from iveg.cli.nodes import node_settings
 from iveg.cli.running import report_ready, run_until_stopped, tune_garbage_collection
 from iveg.domain.witness import Plan
+from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.fleet import FleetSettings, run_emulator
-from iveg.lab.emulator.orders import read_fault_arguments
+from iveg.lab.emulator.layout import lay_out
+from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.world import SimulatedWorld
 from iveg.settings import Settings
 
 if TYPE_CHECKING:
@@ -32,7 +35,8 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
     """Simulated robots, people and climate."""
     tune_garbage_collection()
     fleet = load_fleet(settings.fleet, settings.robots)
-    robots = [one.robot_id for one in fleet.members.values() if one.kind == "live"]
+    members = fleet.members.values()
+    robots = [member.robot_id for member in members if member.kind == "live"]
     if options.robots is not None:
         more = range(len(robots) + 1, options.robots + 1)
         robots = [*robots, *(f"AG{number}" for number in more)][: options.robots]
@@ -41,23 +45,18 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
         _network(options) as network,
     ):
         greenhouse = load_greenhouse(settings.greenhouse)
-        plan = Plan.of(greenhouse)
+        layout = lay_out(scenario_named(options.scenario), robots, greenhouse, fleet)
+        detector = DETECTORS[options.profile]
         work = run_emulator(
-            robots,
-            greenhouse,
+            SimulatedWorld(greenhouse, layout, detector, options.seed),
             FleetSettings(
-                node_settings(settings, Path(directory), plan),
+                node_settings(settings, Path(directory), Plan.of(greenhouse)),
                 options.held,
                 options.hz,
                 has_equipment=settings.equipment == DEMO,
             ),
-            scenario=options.scenario,
-            seed=options.seed,
-            profile=options.profile,
-            faults=read_fault_arguments(options.fault, robots),
             fault_port=options.fault_port,
             network=network,
-            description=fleet,
         )
         report_ready()
         await work

@@ -215,7 +215,7 @@ class EmulatedDetector:
             if encounter.ghost is not None:
                 ghost = encounter.ghost
                 sure = self._probability(ghost.confidence)
-                drawn.append(upright_box(pose, ghost.class_id, ghost.x, ghost.y, sure))
+                drawn.append(_upright_box(pose, ghost.class_id, ghost.x, ghost.y, sure))
         return tuple(drawn)
 
     # --- what is in view ----------------------------------------------------------
@@ -286,7 +286,7 @@ class EmulatedDetector:
         return float(min(max(flickering, 0.05), 0.99))
 
 
-def upright_box(
+def _upright_box(
     pose: Pose2D, class_id: str, x: float, y: float, probability: float
 ) -> Detection:
     """A box of a person's size at a position in ``map``, given in ``base_link``."""

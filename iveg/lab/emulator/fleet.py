@@ -10,7 +10,7 @@ them as tiles.
 import asyncio
 import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -18,17 +18,11 @@ import orjson
 
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.domain.errors import DataFileError
-from iveg.domain.fleet import FleetDescription
 from iveg.domain.geometry import REST, Twist2D
-from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Climate, Instant
 from iveg.domain.stamps import format_stamp
-from iveg.lab.emulator.camera import DETECTORS
-from iveg.lab.emulator.layout import lay_out
-from iveg.lab.emulator.orders import FaultOrder, Order, open_fault_port
+from iveg.lab.emulator.orders import FaultOrder, open_fault_port
 from iveg.lab.emulator.ros2_base import Ros2Base
-from iveg.lab.emulator.scenarios import Incident, scenario_named
 from iveg.lab.emulator.world import EmulatedSensors, RobotHardware, SimulatedWorld
 from iveg.ngsi import names
 from iveg.ngsi.codec import write_climate
@@ -91,7 +85,7 @@ EQUIPMENT: Mapping[str, Callable[[float], Measures]] = {
 """By device."""
 
 
-def tell_all(link: MqttLink, apikey: str, wall: float) -> None:
+def send_equipment(link: MqttLink, apikey: str, wall: float) -> None:
     """Have each device send what it measures now."""
     for device, measure in EQUIPMENT.items():
         payload = orjson.dumps({**measure(wall), "TimeInstant": format_stamp(wall)})
@@ -212,8 +206,7 @@ class EmulatedRobot:
         self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
         if self._node_task is None:
             return
-        if not self._rig.faults.freeze_odometry:
-            node.sense(self._rig.odometry())
+        node.sense(self._rig.odometry())
         navigation = self._rig.navigation()
         task, published_at = self._navigation_sent
         if navigation.task != task or now - published_at >= _NAVIGATION_EVERY_S:
@@ -276,55 +269,34 @@ def _log_port(port: int) -> None:
 
 
 async def run_emulator(
-    robots: Sequence[str],
-    greenhouse: Greenhouse,
+    world: SimulatedWorld,
     settings: FleetSettings,
     *,
-    scenario: str = "demo",
-    seed: int = 1,
-    profile: str = "simulation",
-    faults: Sequence[FaultOrder] = (),
     fault_port: int | None = None,
     on_fault_port: Callable[[int], None] = _log_port,
     network: Network | None = None,
-    description: FleetDescription | None = None,
 ) -> None:
-    """Run a scenario until cancelled.
+    """Run a world in real time until cancelled.
 
     Args:
-        robots: Their ids.
-        greenhouse: Greenhouse they drive in.
+        world: Robots and people.
         settings: Those of all robots; the directory of the hold files is made if
             missing.
-        scenario: Name of a scenario of ``iveg.lab.emulator.scenarios``.
-        seed: The same seed gives the same people and the same noise.
-        profile: Of the detector: ``field``, ``simulation`` or ``perfect``.
-        faults: Faults from the start.
         fault_port: Loopback port for fault orders; 0 takes a free one; None has none.
         on_fault_port: Called with the port in use.
         network: DDS: the robots are ROS 2 bases there, controlled by ``iveg robot``;
             topics are below ``/`` and the robot's id in lower case.
-        description: Fleet description; None: the built-in one.
 
     Raises:
-        DataFileError: no such scenario or profile, or too many robots for the
-            greenhouse.
         SettingsError: the fault port is in use.
     """
-    if profile not in DETECTORS:
-        known = ", ".join(DETECTORS)
-        raise DataFileError(f"profile {profile!r}", "", f"is not one of {known}.")
-    layout = lay_out(scenario_named(scenario), robots, greenhouse, description)
-    detector = DETECTORS[layout.detector or profile]
-    world = SimulatedWorld(greenhouse, layout, detector, seed)
-    incidents = (*(Incident(0.0, order) for order in faults), *layout.incidents)
     fleet = SimulatedFleet(world, settings, network)
     if fault_port is None:
-        await fleet.run(incidents)
+        await fleet.run()
         return
     async with open_fault_port(fault_port, fleet.obey) as port:
         on_fault_port(port)
-        await fleet.run(incidents)
+        await fleet.run()
 
 
 class SimulatedFleet:
@@ -342,7 +314,6 @@ class SimulatedFleet:
     ) -> None:
         self._world = world
         self._settings = settings
-        self._started = clock.now()
         settings.node.directory.mkdir(parents=True, exist_ok=True)
         self._robots: dict[str, EmulatedRobot | Ros2Base] = {}
         for robot_id, rig in world.rigs.items():
@@ -356,20 +327,15 @@ class SimulatedFleet:
                     rig, world, network, config, settings.rate_hz
                 )
 
-    async def run(self, incidents: Sequence[Incident] = ()) -> None:
+    async def run(self) -> None:
         """Run until cancelled."""
-        self._started = clock.now()
-        period = 1.0 / self._settings.rate_hz
+        began, period = clock.mono(), 1.0 / self._settings.rate_hz
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(every(period, self._walk), name="people")
             tasks.create_task(self._climate(), name="climate")
             for place, robot in enumerate(self._robots.values()):
                 phase = place * period / SLOTS / len(self._robots)
-                tasks.create_task(
-                    robot.run(self._started.mono, phase), name=f"rig-{robot.robot_id}"
-                )
-            for incident in incidents:
-                tasks.create_task(self._happen(incident), name="incident")
+                tasks.create_task(robot.run(began, phase), name=f"rig-{robot.robot_id}")
 
     def _walk(self, dt: float) -> None:
         self._world.walk(min(dt, LONGEST_STEP_S))
@@ -378,42 +344,24 @@ class SimulatedFleet:
         link = MqttLink(self._settings.node.address, "climate")
         topic = names.measure_topic(self._settings.node.apikey, names.CLIMATE_DEVICE)
 
-        def tell(_: float) -> None:
+        def measure(_: float) -> None:
             wall = clock.wall()
             link.enqueue(topic, write_climate(climate_at(wall), format_stamp(wall)))
             if self._settings.has_equipment:
-                tell_all(link, self._settings.node.apikey, wall)
+                send_equipment(link, self._settings.node.apikey, wall)
 
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(link.run(), name="climate-link")
-            await every(_CLIMATE_EVERY_S, tell)
+            await every(_CLIMATE_EVERY_S, measure)
 
-    async def _happen(self, incident: Incident) -> None:
-        robot = self._robots.get(incident.order.robot)
-        if robot is None:
-            return
-        await robot.started.wait()
-        await asyncio.sleep(incident.at_s)
-        while True:
-            _log.info("%s", incident.order.model_dump_json(exclude_unset=True))
-            robot.obey(incident.order)
-            if incident.every_s == 0.0:
-                return
-            await asyncio.sleep(incident.every_s)
-
-    def obey(self, order: Order) -> str | None:
+    def obey(self, order: FaultOrder) -> str | None:
         """Execute a fault order.
 
         Returns:
             None, or the reason why it cannot be done.
         """
-        if isinstance(order, FaultOrder):
-            robot = self._robots.get(order.robot)
-            if robot is None or not robot.started.is_set():
-                return f"there is no robot {order.robot}, or it has not started yet"
-            robot.obey(order)
-        elif order.person >= len(self._world.people):
-            return f"there are {len(self._world.people)} people, counted from 0"
-        else:
-            self._world.people[order.person].place(order.x, order.y, hold=order.hold)
+        robot = self._robots.get(order.robot)
+        if robot is None or not robot.started.is_set():
+            return f"there is no robot {order.robot}, or it has not started yet"
+        robot.obey(order)
         return None

@@ -1,8 +1,8 @@
 """Fits a scenario to a fleet and a greenhouse.
 
 In the testbed, AGI and AGII drive their scripts and any other fleet shares one round.
-In another greenhouse each robot drives in a lane of its own and people walk beside
-it; in an open field each drives a square.
+In another greenhouse each robot drives in a lane of its own and people walk beside it;
+an open field is treated as lanes beside each other.
 """
 
 import math
@@ -13,20 +13,20 @@ from iveg.adapters.fleet_files import built_in
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription, RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
-from iveg.domain.greenhouse import DriveLane, Greenhouse
+from iveg.domain.greenhouse import Greenhouse
 from iveg.lab.emulator.scenarios import (
     TESTBED,
-    Incident,
     RobotScript,
     Scenario,
     WalkStop,
     route_of,
 )
 
-_RING_CORNERS = ((18.0, 2.0), (18.0, 18.0), (2.0, 18.0), (2.0, 2.0))
+_ROUND_CORNERS = ((18.0, 2.0), (18.0, 18.0), (2.0, 18.0), (2.0, 2.0))
+_MOST_ON_THE_ROUND = 20
 _END_M, _KEEP_OFF_M = 0.5, 0.9
-_FIELD_M, _FIELD_PITCH_M = 12.0, 20.0
-_MOST_ON_THE_RING = 20
+_FIELD_LENGTH_M, _FIELD_WIDTH_M, _FIELD_PITCH_M = 25.0, 3.0, 20.0
+_MOST_WALKERS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +36,6 @@ class Layout:
     robots: Mapping[str, RobotScript]
     profiles: Mapping[str, RobotProfile]
     people: tuple[tuple[WalkStop, ...], ...]
-    incidents: tuple[Incident, ...] = ()
-    detector: str | None = None
 
 
 def lay_out(
@@ -58,7 +56,6 @@ def lay_out(
         DataFileError: the greenhouse has no room for so many robots, or does not fit
             the scenario.
     """
-    extra = scenario.incidents, scenario.detector
     profiles = {robot_id: _body(robot_id, fleet or built_in()) for robot_id in robots}
     if scenario.greenhouse not in (TESTBED, greenhouse.name):
         about = f"is about {scenario.greenhouse}, not {greenhouse.name}"
@@ -66,91 +63,58 @@ def lay_out(
         raise DataFileError(f"scenario {scenario.name!r}", "", reason)
     if greenhouse.name == scenario.greenhouse and set(robots) <= set(scenario.robots):
         scripts = {robot_id: scenario.robots[robot_id] for robot_id in robots}
-        return Layout(scripts, profiles, scenario.people, *extra)
+        return Layout(scripts, profiles, scenario.people)
     if greenhouse.name == TESTBED:
-        return Layout(_on_the_ring(robots), profiles, scenario.people, *extra)
-    if not greenhouse.lanes:
-        people = _around_the_field(robots)
-        return Layout(_in_a_field(robots), profiles, people, *extra)
-    lanes = _lanes_for(profiles, greenhouse)
+        return Layout(_on_the_round(robots), profiles, scenario.people)
+    lanes = _lanes_for(robots, greenhouse)
     scripts = {
-        robot_id: _up_and_down(lane.area, greenhouse)
+        robot_id: _up_and_down(lane, greenhouse)
         for robot_id, lane in zip(robots, lanes, strict=True)
     }
-    people = tuple(_beside(lane.area) for lane in lanes[:4])
-    return Layout(scripts, profiles, people, *extra)
+    people = tuple(_beside(lane) for lane in lanes[:_MOST_WALKERS])
+    return Layout(scripts, profiles, people)
 
 
 def _body(robot_id: str, fleet: FleetDescription) -> RobotProfile:
     """Profile of a robot; one without a description is like AGI."""
-    one = fleet.of_robot(robot_id)
-    return one.profile if one.is_described else built_in().of_robot("AGI").profile
+    member = fleet.of_robot(robot_id)
+    return member.profile if member.is_described else built_in().of_robot("AGI").profile
 
 
-def _on_the_ring(robots: Sequence[str]) -> dict[str, RobotScript]:
+def _on_the_round(robots: Sequence[str]) -> dict[str, RobotScript]:
     """All robots on one closed route, in one direction, evenly spaced."""
-    if len(robots) > _MOST_ON_THE_RING:
-        reason = f"has room for {_MOST_ON_THE_RING} robots, not for {len(robots)}."
+    if len(robots) > _MOST_ON_THE_ROUND:
+        reason = f"has room for {_MOST_ON_THE_ROUND} robots, not for {len(robots)}."
         raise DataFileError(TESTBED, "", reason)
-    route = route_of(_RING_CORNERS, 2.3, True)
+    route = route_of(_ROUND_CORNERS, 2.3, True)
     gap = len(route.points) / len(robots)
     return {
         robot_id: RobotScript(
-            route.pose_at(int(place * gap)), _RING_CORNERS, 2.3, "patrol", cruise=0.6
+            route.pose_at(int(place * gap)), _ROUND_CORNERS, 2.3, "patrol", cruise=0.6
         )
         for place, robot_id in enumerate(robots)
     }
 
 
-def _in_a_field(robots: Sequence[str]) -> dict[str, RobotScript]:
-    """One square for each robot."""
-    scripts = {}
-    for place, robot_id in enumerate(robots):
-        x = place * _FIELD_PITCH_M
-        corners = (
-            (x, 0.0),
-            (x + _FIELD_M, 0.0),
-            (x + _FIELD_M, _FIELD_M),
-            (x, _FIELD_M),
-        )
-        start = Pose2D(x + 3.0, 0.0, 0.0)
-        scripts[robot_id] = RobotScript(start, corners, 2.3, "patrol")
-    return scripts
-
-
-def _around_the_field(robots: Sequence[str]) -> tuple[tuple[WalkStop, ...], ...]:
-    return tuple(
-        (
-            WalkStop(x + 6.0, 1.4, 4.0, 8.0),
-            WalkStop(x + 10.6, 6.0, 4.0, 8.0),
-            WalkStop(x + 6.0, 10.6, 4.0, 8.0),
-        )
-        for x in (place * _FIELD_PITCH_M for place in range(min(4, len(robots))))
-    )
-
-
-def _lanes_for(
-    robots: Mapping[str, RobotProfile], greenhouse: Greenhouse
-) -> list[DriveLane]:
-    """One lane for each robot: the one of its start, else the longest free one.
-
-    Robots with the largest turning radius choose first.
-    """
-    lanes = sorted(greenhouse.lanes, key=lambda lane: -_long(lane.area))
+def _lanes_for(robots: Sequence[str], greenhouse: Greenhouse) -> list[Rectangle]:
+    """One lane for each robot: the one of its start, else the longest free one."""
+    if not greenhouse.lanes:
+        return [_lane_in_a_field(place) for place in range(len(robots))]
+    lanes = sorted((lane.area for lane in greenhouse.lanes), key=_long, reverse=True)
     if len(robots) > len(lanes):
         reason = f"has {len(lanes)} lanes, too few for {len(robots)} robots."
         raise DataFileError(f"greenhouse {greenhouse.name!r}", "", reason)
-    chosen: dict[str, DriveLane] = {}
-    for robot_id, start in zip(robots, greenhouse.starts, strict=False):
-        here = [lane for lane in lanes if lane.area.contains(start.x, start.y)]
-        if here:
-            chosen[robot_id] = here[0]
-            lanes.remove(here[0])
-    needy = sorted(robots, key=lambda robot_id: -robots[robot_id].turning_radius)
-    for robot_id in needy:
-        if robot_id not in chosen:
-            chosen[robot_id] = lanes.pop(0)
-    return [chosen[robot_id] for robot_id in robots]
+    chosen = []
+    for start in greenhouse.starts[: len(robots)]:
+        here = [area for area in lanes if area.contains(start.x, start.y)]
+        chosen.append((here or lanes)[0])
+        lanes.remove(chosen[-1])
+    return [*chosen, *lanes][: len(robots)]
+
+
+def _lane_in_a_field(place: int) -> Rectangle:
+    x = place * _FIELD_PITCH_M
+    return Rectangle(x, 0.0, x + _FIELD_WIDTH_M, _FIELD_LENGTH_M)
 
 
 def _long(area: Rectangle) -> float:

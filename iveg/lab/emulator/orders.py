@@ -1,20 +1,19 @@
-"""Fault orders, on the command line and at an HTTP endpoint on loopback.
+"""Fault orders, at an HTTP endpoint on loopback.
 
-``POST /`` with a ``FaultOrder`` or a ``PersonOrder``; 204 when done, 400 when it cannot
-be read, with a sentence that names the field, 409 when it cannot be done.  Not for
-production: the endpoint is on 127.0.0.1 alone, and only on request.
+``POST /`` with a ``FaultOrder``; 204 when done, 400 when it cannot be read, with a
+sentence that names the field, 409 when it cannot be done.  Not for production: the
+endpoint is on 127.0.0.1 alone, and only on request.
 """
 
-import json
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from http import HTTPStatus
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from iveg.adapters.post_listener import post_listener
-from iveg.domain.errors import DataFileError, SettingsError, UnreadableError
+from iveg.domain.errors import SettingsError, UnreadableError
 from iveg.ngsi.codec.fields import first_complaint
 
 Metres = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -38,32 +37,26 @@ class FaultOrder(_Order):
 
     Attributes:
         mute: Nothing that it publishes arrives, without an error.
-        freeze_odometry: Its odometry stops.
         deaf: Ignores iVeg's speed limits.
         clock_offset_s: Its wall clock is this far ahead (s).
         local_hold: Its red button or bumper is pressed.
         release_locally: The crew lifts local holds and the boot hold.
         kill: Its software ends; ``revive`` starts it again, held.
-        false_person: Its camera detects a person there; null ends that.
         thing: Something there is taken for a person where its camera has it in view, as
             surely and seldom as a person; null ends that.
         hide_people: Its camera detects no person.
-        stuck: Its navigation has given up and asks for no speed.
     """
 
     robot: str
     mute: bool | None = None
-    freeze_odometry: bool | None = None
     deaf: bool | None = None
     clock_offset_s: Annotated[float, Field(ge=-1e9, le=1e9)] | None = None
     local_hold: Literal["hw", "bumper"] | None = None
     release_locally: bool = False
     kill: bool = False
     revive: bool = False
-    false_person: OrderPlace | None = None
     thing: OrderPlace | None = None
     hide_people: bool | None = None
-    stuck: bool | None = None
 
     def changed_by(self, order: "FaultOrder") -> "FaultOrder":
         """The faults in force after another order; fields that it names count."""
@@ -71,23 +64,7 @@ class FaultOrder(_Order):
         return self.model_copy(update=named)
 
 
-class PersonOrder(_Order):
-    """Moves one person to a position; with ``hold`` the person stays there.
-
-    Attributes:
-        person: Counted from 0.
-        x: In ``map`` (m); ``y`` likewise.
-    """
-
-    person: int = Field(ge=0)
-    x: Metres
-    y: Metres
-    hold: bool = False
-
-
-Order = FaultOrder | PersonOrder
-T = TypeVar("T", FaultOrder, PersonOrder)
-Obey = Callable[[Order], str | None]
+Obey = Callable[[FaultOrder], str | None]
 """Executes an order; returns the reason if it cannot."""
 
 
@@ -123,64 +100,13 @@ async def open_fault_port(port: int, obey: Obey) -> AsyncIterator[int]:
         yield bound
 
 
-def read_order(body: bytes) -> Order:
+def read_order(body: bytes) -> FaultOrder:
     """Parse one order from JSON.
 
     Raises:
         UnreadableError: not an order; one sentence names the field.
     """
     try:
-        value = json.loads(body)
-    except (ValueError, RecursionError) as error:
-        raise UnreadableError("not_json") from error
-    if not isinstance(value, dict):
-        raise UnreadableError("no_object", "an order has a robot or a person")
-    if "person" in value:
-        return _validated(PersonOrder, value)
-    return _validated(FaultOrder, value)
-
-
-def read_fault_arguments(
-    words: Sequence[str], robots: Sequence[str]
-) -> list[FaultOrder]:
-    """Parse the orders of a command line: ``field=value``, or ``robot:field=value``.
-
-    Args:
-        words: Arguments such as ``mute=true`` or ``AGI:deaf=true``.
-        robots: Robots of an order that names none.
-
-    Raises:
-        DataFileError: an argument is not an order; names it with the reason.
-    """
-    orders: list[FaultOrder] = []
-    for word in words:
-        key, equals, text = word.partition("=")
-        robot, colon, field = key.rpartition(":")
-        if not equals or field in ("", "robot"):
-            reason = "must be field=value or robot:field=value."
-            raise DataFileError("--fault", word, reason)
-        if colon and robot not in robots:
-            reason = f"there is no robot {robot} among {', '.join(robots)}."
-            raise DataFileError("--fault", word, reason)
-        for one in [robot] if colon else robots:
-            try:
-                order = _validated(FaultOrder, {"robot": one, field: _value(text)})
-            except UnreadableError as error:
-                raise DataFileError("--fault", word, f"{error.detail}.") from error
-            orders.append(order)
-    return orders
-
-
-def _value(text: str) -> object:
-    """Parse as JSON if possible, else as text, since quotation marks are not typed."""
-    try:
-        return json.loads(text)
-    except ValueError:
-        return text
-
-
-def _validated(kind: type[T], value: dict[str, object]) -> T:
-    try:
-        return kind.model_validate(value)
+        return FaultOrder.model_validate_json(body)
     except ValidationError as error:
         raise UnreadableError("bad_order", first_complaint(error)) from error

@@ -163,8 +163,7 @@ class Ros2Base:
         asked = self._navigation.requested_twist(requested, command, now.mono)
         self._wishes.write(cdr.write(write_twist(asked)))
         self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
-        if not self._rig.faults.freeze_odometry:
-            self._tell_place(ros.Time.of(now.wall))
+        self._tell_place(ros.Time.of(now.wall))
 
     def _read_commands(self, now: float) -> None:
         twist = self._newest(self._commands, _read_twist)

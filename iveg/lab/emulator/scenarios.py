@@ -1,4 +1,4 @@
-"""Named runs as data: routes of robots, rounds of people, faults, expected outcome.
+"""Named runs as data: routes of robots, rounds of people, expected outcome.
 
 All but ``nlos-field`` are written for the testbed of the paper (``mvsim-20x20``):
 corridors lie at x = 2, 6, 10, 14, 18 m, crop between them at x = 4, 8, 12, 16 m from
@@ -14,7 +14,6 @@ import numpy as np
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import PERSON_RADIUS_M, Pose2D
 from iveg.lab.emulator.greenhouse import Body, Disc, Floats, Scenery
-from iveg.lab.emulator.orders import FaultOrder, OrderPlace
 
 WALKING_SPEED = 1.4
 """(m/s), as in the seed paper; ISO 13855 assumes 1.6."""
@@ -48,7 +47,6 @@ class SimulatedPerson:
         self._rng = rng
         self._next = 0
         self._busy_s = self._drawn()
-        self._held = False
         self.x, self.y = round_[0].x, round_[0].y
 
     @property
@@ -56,14 +54,8 @@ class SimulatedPerson:
         """Footprint of the person."""
         return Disc(self.x, self.y, PERSON_RADIUS_M)
 
-    def place(self, x: float, y: float, *, hold: bool) -> None:
-        """Move the person to a position; with ``hold`` the person stays there."""
-        self.x, self.y, self._held = x, y, hold
-
     def step(self, dt: float, robots: Sequence[Body], scenery: Scenery) -> None:
         """Walk, work or step aside for ``dt`` (s)."""
-        if self._held:
-            return
         move_x, move_y = self._walk(dt)
         for robot in robots:
             move_x, move_y = self._give_way(move_x, move_y, dt, robot)
@@ -255,20 +247,6 @@ class RobotScript:
 
 
 @dataclass(frozen=True, slots=True)
-class Incident:
-    """A fault injected during a run.
-
-    Attributes:
-        at_s: Seconds into the run; again every ``every_s`` where that is not 0.
-        order: The fault.
-    """
-
-    at_s: float
-    order: FaultOrder
-    every_s: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
 class Scenario:
     """One named run.
 
@@ -277,7 +255,6 @@ class Scenario:
         outcome: Expected outcome in iVeg; checked by a test of the whole stack.
         robots: Scripts by robot id; a fleet with other ids uses the route of ``many``.
         people: Stops of each person.
-        detector: Replaces the requested detector profile.
         greenhouse: The greenhouse that it is written for.
     """
 
@@ -286,8 +263,6 @@ class Scenario:
     outcome: str
     robots: Mapping[str, RobotScript]
     people: tuple[tuple[WalkStop, ...], ...] = ()
-    incidents: tuple[Incident, ...] = ()
-    detector: str | None = None
     greenhouse: str = TESTBED
 
 
@@ -409,9 +384,6 @@ _FACES_AWAY = RobotScript(
 grower it never looks at."""
 _GROWER_IN_6 = (WalkStop(24.3, 25.5, 60.0, 60.0),)
 
-_COAT = OrderPlace(x=11.5, y=9.0)
-"""Hangs where the worker of corridor 3 stands in other scenarios."""
-
 _SCENARIOS = (
     Scenario(
         "demo",
@@ -435,14 +407,6 @@ _SCENARIOS = (
         {"AGI": _FACES_GROWER, "AGII": _FACES_AWAY},
         (_GROWER_IN_6,),
         greenhouse="agroconnect",
-    ),
-    Scenario(
-        "coat",
-        "AGI takes a coat in corridor 3 for a person; nobody is there.",
-        "AGII slows for it, until somebody marks it as no person.",
-        {"AGI": _WATCH, "AGII": _HAUL_ON},
-        incidents=(Incident(0.1, FaultOrder(robot="AGI", thing=_COAT)),),
-        detector="simulation",
     ),
     Scenario(
         "viewpoints",
@@ -479,32 +443,12 @@ _SCENARIOS = (
         _FOUR_PEOPLE,
     ),
     Scenario(
-        "deaf",
-        "As nlos, but AGII drives as it likes whatever iVeg says.",
-        "Two seconds after AGII met a person at full speed there is a P1 alert.",
-        {"AGI": _WATCH, "AGII": _HAUL_ON},
-        (_PICKER_IN_3,),
-        (Incident(1.0, FaultOrder(robot="AGII", deaf=True)),),
-    ),
-    Scenario(
-        "noisy-crossing",
-        "A person crosses in front of AGI under a detector that flickers about its "
-        "threshold.",
+        "crossing",
+        "A person crosses in front of AGI; with the profile `noisy` the detector "
+        "flickers about the threshold.",
         "AGI slows once and speeds up once.",
         {"AGI": _THROUGH, "AGII": _HAUL},
         (_CROSSER,),
-        detector="noisy",
-    ),
-    Scenario(
-        "link-loss",
-        "As demo; each minute nothing that AGII says arrives for five seconds.",
-        "AGII is late, then lost; meanwhile it slows and stands, and later drives on.",
-        {"AGI": _SCOUT, "AGII": _HAUL},
-        _FOUR_PEOPLE,
-        (
-            Incident(4.0, FaultOrder(robot="AGII", mute=True), every_s=60.0),
-            Incident(9.0, FaultOrder(robot="AGII", mute=False), every_s=60.0),
-        ),
     ),
 )
 SCENARIOS: Mapping[str, Scenario] = {scenario.name: scenario for scenario in _SCENARIOS}

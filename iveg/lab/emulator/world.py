@@ -29,7 +29,6 @@ from iveg.lab.emulator.camera import (
     person_target,
     robot_target,
     thing_target,
-    upright_box,
 )
 from iveg.lab.emulator.greenhouse import Body, Disc, LaserModel, Scenery, sweep
 from iveg.lab.emulator.layout import Layout
@@ -70,7 +69,6 @@ class EmulatedSensors:
 
 
 _LASER = LaserModel()
-_FALSE_PERSON_CONFIDENCE = 0.95
 
 
 class RobotHardware:
@@ -78,7 +76,7 @@ class RobotHardware:
 
     Attributes:
         command: Last command of the drive.
-        faults: Faults in force; those of camera and navigation show here.
+        faults: Faults in force; those of the camera show here.
     """
 
     def __init__(
@@ -116,8 +114,6 @@ class RobotHardware:
 
     def requested_twist(self, now: float, around: "SimulatedWorld") -> Twist2D:
         """Twist that navigation requests; ``now`` in seconds into the run."""
-        if self.faults.stuck:
-            return REST
         discs = around.discs()
         for body in around.bodies_but(self.robot_id):
             discs.extend(body.discs())
@@ -163,9 +159,6 @@ class RobotHardware:
         if faults.thing is not None:
             targets.append(thing_target(faults.thing.x, faults.thing.y))
         found = self._detector.detect(now, pose, targets, around.scenery)
-        if ghost := faults.false_person:
-            sure = _FALSE_PERSON_CONFIDENCE
-            found = (*found, upright_box(pose, PERSON, ghost.x, ghost.y, sure))
         return DetectionFrame(self.robot_id, Origin(), found, (), self._detector.name)
 
     def part_seen(self, target: Target, around: "SimulatedWorld") -> float:
@@ -273,11 +266,10 @@ def true_picture(
 
     ``{"robot", "at": Unix s, "pose": {"x", "y", "yaw"}, "speed", "wanted", "factor",
     "visible": [{"key", "class", "x", "y", "part"}], "people": [{"key", "x", "y",
-    "hidden"}], "robots": [{"key", "x", "y", "yaw"}]}``: the robot's true pose in
-    ``map`` (m, rad) and speed (m/s), ``Driving``, all targets of which a part (0 to 1)
-    is in its view, and every person and robot in the greenhouse, by their true
-    positions, whatever the detector reports; ``hidden``: crop or crates are between
-    this robot's ``base_link`` and the person.
+    "hidden"}]}``: the robot's true pose in ``map`` (m, rad) and speed (m/s),
+    ``Driving``, all targets of which a part (0 to 1) is in its view, and every person
+    in the greenhouse, by their true positions, whatever the detector reports;
+    ``hidden``: crop or crates are between this robot's ``base_link`` and the person.
 
     Args:
         rig: The robot whose picture it is.
@@ -289,7 +281,7 @@ def true_picture(
     return {
         "robot": rig.robot_id,
         "at": at,
-        "pose": _pose(pose),
+        "pose": {**_place(pose), "yaw": round(pose.yaw, 4)},
         "speed": round(rig.vehicle.twist.linear_x, 3),
         "wanted": round(driving.wanted, 3),
         "factor": driving.factor,
@@ -305,21 +297,13 @@ def true_picture(
         "people": [
             {
                 "key": f"person-{number}",
-                **_place(one),
-                "hidden": world.scenery.hides(pose.x, pose.y, one.x, one.y),
+                **_place(disc),
+                "hidden": world.scenery.hides(pose.x, pose.y, disc.x, disc.y),
             }
-            for number, one in enumerate(world.discs())
-        ],
-        "robots": [
-            {"key": one.robot_id, **_pose(one.vehicle.pose)}
-            for one in world.rigs.values()
+            for number, disc in enumerate(world.discs())
         ],
     }
 
 
 def _place(point: Pose2D | Disc) -> dict[str, float]:
     return {"x": round(point.x, 3), "y": round(point.y, 3)}
-
-
-def _pose(pose: Pose2D) -> dict[str, float]:
-    return {**_place(pose), "yaw": round(pose.yaw, 4)}

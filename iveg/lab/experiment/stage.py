@@ -1,7 +1,7 @@
 """Stages of an experiment: robots and iVeg on a virtual clock, and what is recorded."""
 
 import asyncio
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import count
 from typing import Final
@@ -18,7 +18,7 @@ from iveg.domain.witness import Outline, Plan
 from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.orders import FaultOrder
-from iveg.lab.emulator.scenarios import Incident, scenario_named
+from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import Driving, RobotHardware, SimulatedWorld, true_picture
 from iveg.lab.experiment.messages import MessageTimes
 from iveg.lab.experiment.plan import ROBOTS, PlannedRun
@@ -237,7 +237,6 @@ class Stage:
     """One scenario in steps of a twentieth of a second.
 
     Args:
-        incidents: Its faults.
         feedback: Feedback that iVeg has published; it grows.
         move_clock: Advances the clock by seconds; returns the time.
         hear: Called with each message of a robot, from its creation on.
@@ -250,7 +249,6 @@ class Stage:
     def __init__(
         self,
         world: SimulatedWorld,
-        incidents: Iterable[Incident],
         ingest: Ingest,
         loop: RuleLoop,
         feedback: Sequence[Feedback],
@@ -263,7 +261,6 @@ class Stage:
         is_witness: bool = True,
     ) -> None:
         self._world = world
-        self._incidents = [(one.at_s, one.order) for one in incidents]
         self._ingest, self._loop, self._feedback = ingest, loop, feedback
         self._move_clock = move_clock
         self.now = move_clock(0.0)
@@ -281,9 +278,6 @@ class Stage:
         number = self._steps
         self._steps += 1
         self.now = self._move_clock(round(self._steps * STEP_S, 6))
-        for at_s, order in self._incidents:
-            if number == round(at_s / STEP_S):
-                self.happen(order)
         self._world.walk(STEP_S)
         for robot in self.robots.values():
             robot.step(number, self._world, self.now)
@@ -327,11 +321,10 @@ class VirtualRun:
             rule = replace(rule, possible_people=False, foresight=False)
         self._iveg = iveg = VirtualPipeline(load_fleet(words=ROBOTS), greenhouse, rule)
         self._views = Views(iveg.parts)
-        detector = DETECTORS[layout.detector or step.profile]
+        detector = DETECTORS[step.profile]
         self._world = SimulatedWorld(greenhouse, layout, detector, step.seed)
         self._stage = Stage(
             self._world,
-            layout.incidents,
             iveg.parts.ingest,
             iveg.parts.loop,
             iveg.feedback,
