@@ -210,7 +210,8 @@ NO_TOKEN = "token endpoint down"  # noqa: S105 - a cause
 _TOKEN_PART = 0.9
 
 Document = dict[str, Any]
-_T, _V = TypeVar("_T"), TypeVar("_V")
+_T = TypeVar("_T")
+_V = TypeVar("_V")
 _OBJECT: TypeAdapter[Document] = TypeAdapter(Document)
 _OBJECTS: TypeAdapter[list[Document]] = TypeAdapter(list[Document])
 _NUMBER = TypeAdapter(int)
