@@ -22,7 +22,12 @@ from benchmarks.fiware_ends import HOST
 from benchmarks.process import Usage, machine, pause, percentile, print_table
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.reconciler import ensure_subscriptions, provision, wanted_for
+from iveg.adapters.reconciler import (
+    FiwareSite,
+    ensure_subscriptions,
+    provision,
+    wanted_for,
+)
 from iveg.lab.embedded.server import embedded_fiware
 
 TENANT = ("agroconnect", "/greenhouse")
@@ -80,7 +85,9 @@ async def _prepare(
         IotAgentClient(f"http://{HOST}:{iota_port}", *TENANT) as agent,
     ):
         robots = [f"R{index}" for index in range(most)]
-        await provision(agent, orion, robots, "iveg", f"http://{HOST}:{orion_port}")
+        await provision(
+            agent, orion, FiwareSite(robots, "iveg", f"http://{HOST}:{orion_port}")
+        )
         url = f"http://{HOST}:{notify_port}/ngsi/notifications"
         await ensure_subscriptions(orion, url, "ab" * 16, wanted_for())
 

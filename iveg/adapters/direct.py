@@ -50,11 +50,6 @@ class _Source:
 class Intake(Protocol):
     """Takes what is read: the pipeline's, or one that draws for viewers."""
 
-    def is_past(
-        self, robot_id: str, kind: type[Observation], boot: str, seq: int
-    ) -> bool:
-        """Whether the identity of a message shows that it is no news."""
-
     def is_early(self, robot_id: str, kind: type[Observation], now: float) -> bool:
         """Whether a message comes too soon after one of its kind to be read."""
 
@@ -96,19 +91,18 @@ class DirectReader:
         self, apikey: str, robot_id: str, kinds: Iterable[Kind]
     ) -> Iterator[tuple[str, _Source]]:
         """Topics of one robot."""
-        measure = partial(codec.read_measure, is_past=self._intake.is_past)
         for kind in kinds:
             if kind.suffix is None:
                 continue
             name = robot_id + kind.suffix
-            read = partial(measure, name)
+            read = partial(codec.read_measure, name)
             source = _Source(robot_id, kind.qos, read, kind.of)
             yield names.measure_topic(apikey, name), source
             if kind.speaks_alone:
                 alone = names.direct_topic(robot_id, kind.suffix)
                 yield alone, replace(source, sparse=False)
         if kinds:
-            whole = partial(measure, robot_id)
+            whole = partial(codec.read_measure, robot_id)
             yield names.measure_topic(apikey, robot_id), _Source(robot_id, 1, whole)
             answer = partial(codec.read_answer, robot_id)
             yield names.answer_topic(apikey, robot_id), _Source(robot_id, 1, answer)

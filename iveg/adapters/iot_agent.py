@@ -23,14 +23,6 @@ class IotAgentClient(FiwareHttp):
         response = await self.ask("GET", "/iot/about", timeout_s=PROBE_TIMEOUT_S)
         return str(self.read_object(response).get("version", "unknown"))
 
-    async def read_groups(self) -> list[Document]:
-        """The groups of our tenant.
-
-        Raises:
-            HopError: the agent does not answer.
-        """
-        return await self.read_all("/iot/services", {}, "services")
-
     async def create_group(self, group: Document) -> bool:
         """Make a group; False where there is one with this key already.
 
@@ -110,7 +102,7 @@ def write_device(
         "entity_name": entity,
         "entity_type": kind,
         "apikey": apikey,
-        "protocol": "JSON",
+        "protocol": names.PROTOCOL,
         "transport": "MQTT",
         "attributes": [
             {"object_id": name, "name": name, "type": kind} for name, kind in attributes

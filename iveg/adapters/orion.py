@@ -4,11 +4,10 @@ Orion's 204 to a command proves nothing: it also answers so when the command wen
 nowhere (docs/fiware.md).  The evidence is the robot's own answer.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from datetime import datetime
 
 from iveg.adapters.fiware_http import (
-    PAGE_SIZE,
     PROBE_TIMEOUT_S,
     TIMEOUT_S,
     Document,
@@ -103,31 +102,6 @@ class OrionClient(FiwareHttp):
             {"type": names.HEARTBEAT_TYPE, "attrs": "probe"},
             PROBE_TIMEOUT_S,
         )
-
-    async def find_entities(self, ids: Sequence[str]) -> list[tuple[str, str]]:
-        """Id and type of those of these entities that Orion itself keeps.
-
-        Raises:
-            HopError: Orion does not answer.
-        """
-        query = {
-            "id": ",".join(ids),
-            "attrs": "dateCreated",
-            "options": "keyValues,skipForwarding",
-            "limit": str(PAGE_SIZE),
-        }
-        response = await self.ask("GET", "/v2/entities", query=query)
-        found = self.read_list(response)
-        return [(str(one["id"]), str(one["type"])) for one in found if one.get("id")]
-
-    async def delete_entity(self, entity_id: str, entity_type: str) -> None:
-        """Delete an entity; one that is gone already is no error.
-
-        Raises:
-            HopError: Orion does not answer.
-        """
-        path, query = f"/v2/entities/{entity_id}", {"type": entity_type}
-        await self.ask("DELETE", path, query=query, also=(404,))
 
     async def modified_at(self, robot_id: str) -> float | None:
         """When Orion last changed a robot's odometry.

@@ -13,53 +13,33 @@ import contextlib
 import logging
 import random
 from collections.abc import Awaitable, Callable, Sequence
-from dataclasses import dataclass
 
 from iveg.adapters import clock
 from iveg.adapters.fiware_http import MEANINGLESS
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.reconciler import ensure_subscriptions, provision, wanted_for
-from iveg.domain.equipment import Tile
+from iveg.adapters.reconciler import (
+    FiwareSite,
+    ensure_subscriptions,
+    provision,
+    wanted_for,
+)
 from iveg.domain.errors import HopError, NoAnswerError
 from iveg.domain.observations import HeartbeatProbe, Instant, Origin, Received
+from iveg.domain.probe import SLOW_S
 from iveg.domain.transports import FIWARE
 from iveg.ngsi import codec, names
-from iveg.vital.health_monitor import PROBE_PERIOD_S, HealthMonitor, Pace
+from iveg.vital.health_monitor import PROBE_PERIOD_S, HealthMonitor
 from iveg.vital.ingest import Ingest
 
 _log = logging.getLogger(__name__)
 _ASK_PERIOD_S, _REPAIR_PERIOD_S = 1.0, 4.0
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 3.0
-_LONGEST_DEVICES_WAIT_S = 32.0
+_UNANSWERED_S = 30.0
+"""No look at devices for so long after one that got no answer: it may be queued."""
 _DEVICES_EVERY = 3
 """While all is well, devices are looked at every third time."""
-
-
-@dataclass(frozen=True, slots=True)
-class FiwareSite:
-    """Facts of us that FIWARE should know.
-
-    Attributes:
-        robots: The fleet.
-        apikey: First part of every topic.
-        context_broker_url: Orion as the agent reaches it.
-        notify_url: Where Orion shall post.
-        notify_token: Secret that each notification carries.
-        boot: Of this start, in its probes.
-        tiles: Of other equipment.
-        scanned: Robots whose scans iVeg reads from the broker.
-    """
-
-    robots: Sequence[str]
-    apikey: str
-    context_broker_url: str
-    notify_url: str
-    notify_token: str
-    boot: str
-    tiles: Sequence[Tile] = ()
-    scanned: Sequence[str] = ()
 
 
 class Provisioner:
@@ -77,13 +57,11 @@ class Provisioner:
         self._orion, self._agent, self._link = orion, agent, link
         self._health_monitor, self._ingest, self._site = health_monitor, ingest, site
         self._probe_seq = self._rounds = 0
-        self._devices_at = self._devices_wait_s = 0.0
-        self._paces = {"orion": Pace(), "iot_agent": Pace()}
+        self._devices_at = 0.0
         self._broken: set[str] = set()
         self._warned: frozenset[str] = frozenset()
         self._gap = asyncio.Event()
         self._subscription_ids: frozenset[str] = frozenset()
-        self._former_ids: frozenset[str] = frozenset()
         self._former_secrets: frozenset[str] = frozenset()
         self._is_subscribing = False
 
@@ -101,7 +79,6 @@ class Provisioner:
         """
         return (
             subscription_id in self._subscription_ids
-            or subscription_id in self._former_ids
             or self._is_subscribing
             or not self._subscription_ids
         )
@@ -159,7 +136,7 @@ class Provisioner:
             return self._tell("orion", error)
         at = clock.now()
         monitor.orion_ok_at = at.mono
-        monitor.orion_slow = self._slow("orion", at.mono - before.mono)
+        monitor.orion_slow = _slow(at.mono - before.mono)
         for observation in codec.read_entity(entity or {}).observations:
             if isinstance(observation, HeartbeatProbe):
                 monitor.stored(observation.origin)
@@ -177,23 +154,16 @@ class Provisioner:
             monitor.agent_silent = error.detail if is_silent else ""
             monitor.agent_error = "" if is_silent else error.detail
             return self._tell("iot_agent", error)
-        spent = clock.now().mono - before.mono
-        monitor.agent_slow = self._slow("iot_agent", spent)
+        monitor.agent_slow = _slow(clock.now().mono - before.mono)
         if self._agent_trouble:
             monitor.agent_error = monitor.agent_silent = ""
-            self._devices_wait_s = self._devices_at = 0.0
+            self._devices_at = 0.0
             self._gap.set()
         return self._tell("iot_agent", None)
 
     @property
     def _agent_trouble(self) -> str:
         return self._health_monitor.agent_error or self._health_monitor.agent_silent
-
-    def _slow(self, hop: str, spent_s: float) -> str:
-        pace = self._paces[hop]
-        detail = pace.took(spent_s)
-        self._tell(f"{hop}'s speed", HopError(hop, detail) if pace.is_fault else None)
-        return detail
 
     # --- devices, subscriptions, reads --------------------------------------------
 
@@ -240,26 +210,14 @@ class Provisioner:
         if what == "devices":
             self._health_monitor.agent_warning = failure.detail
             if isinstance(failure, NoAnswerError):
-                # Repeated ever later: the question may still be queued.
-                longer = max(_REPAIR_PERIOD_S, 2 * self._devices_wait_s)
-                self._devices_wait_s = min(_LONGEST_DEVICES_WAIT_S, longer)
-                self._devices_at = clock.now().mono + self._devices_wait_s
+                self._devices_at = clock.now().mono + _UNANSWERED_S
         elif what == "subscriptions":
             self._health_monitor.notify_error = failure.detail
         ask = self._ask_agent if failure.hop == "iot_agent" else self._ask_orion
         return await ask() and self._tell(what, failure)
 
     async def _check_devices(self) -> None:
-        site = self._site
-        done = await provision(
-            self._agent,
-            self._orion,
-            robots=site.robots,
-            apikey=site.apikey,
-            cbroker_url=site.context_broker_url,
-            tiles=site.tiles,
-        )
-        self._devices_wait_s = self._devices_at = 0.0
+        done = await provision(self._agent, self._orion, self._site)
         _explain(done.mended)
         # What only a person can mend stands on the health page while it lasts.
         self._health_monitor.agent_warning = _in_short(done.problems)
@@ -283,7 +241,6 @@ class Provisioner:
         # What is made at the start was never missed.
         missed = _in_short(done.mended) if self._subscription_ids else ""
         self._subscription_ids = done.ids
-        self._former_ids |= done.former_ids
         self._former_secrets |= done.former_secrets
         _explain(done.mended)
         monitor.notify_detail, monitor.notify_error = done.failing, missed
@@ -338,3 +295,8 @@ def _explain(mended: Sequence[str]) -> None:
 def _in_short(sentences: Sequence[str]) -> str:
     more = f" And {len(sentences) - 1} more." if len(sentences) > 1 else ""
     return sentences[0] + more if sentences else ""
+
+
+def _slow(spent_s: float) -> str:
+    """Problem that a response time shows (s); empty for none."""
+    return f"answers take {spent_s:.1f} s" if spent_s > SLOW_S else ""

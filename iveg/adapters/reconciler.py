@@ -5,9 +5,8 @@ So it may run at every start and every few seconds.  It keeps the way of command
 the robot clear; the traps are in docs/fiware.md, "Provisioning".
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from iveg.adapters.fiware_http import Document
 from iveg.adapters.iot_agent import IotAgentClient, write_device, write_group
@@ -20,6 +19,31 @@ from iveg.ngsi import names
 
 
 @dataclass(frozen=True, slots=True)
+class FiwareSite:
+    """Facts of us that FIWARE should know.
+
+    Attributes:
+        robots: The fleet.
+        apikey: First part of every topic.
+        context_broker_url: Orion as the agent reaches it.
+        tiles: Of other equipment, whose devices are made where they name one.
+        scanned: Robots whose scans iVeg reads from the broker.
+        notify_url: Where Orion shall post.
+        notify_token: Secret that each notification carries.
+        boot: Of this start, in its probes.
+    """
+
+    robots: Sequence[str]
+    apikey: str
+    context_broker_url: str
+    tiles: Sequence[Tile] = ()
+    scanned: Sequence[str] = ()
+    notify_url: str = ""
+    notify_token: str = ""
+    boot: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Reconciled:
     """Result of a step, as sentences.
 
@@ -27,7 +51,6 @@ class Reconciled:
         mended: What it made or corrected; empty when all was well.
         problems: What it may not touch and a person should look at.
         ids: The subscriptions that are ours.
-        former_ids: Those that had our name and are no more.
         former_secrets: Secrets that some with our name brought, of an earlier start.
         failing: Why Orion cannot deliver, in its words; empty when it can.
     """
@@ -35,40 +58,48 @@ class Reconciled:
     mended: tuple[str, ...] = ()
     problems: tuple[str, ...] = ()
     ids: frozenset[str] = frozenset()
-    former_ids: frozenset[str] = frozenset()
     former_secrets: frozenset[str] = frozenset()
     failing: str = ""
+
+
+def _holds(there: object, wanted: object) -> bool:
+    """Whether JSON has all that is wanted; objects may have other members, too."""
+    if isinstance(wanted, dict):
+        return isinstance(there, dict) and all(
+            _holds(there.get(name), value) for name, value in wanted.items()
+        )
+    if isinstance(wanted, list):
+        return (
+            isinstance(there, list)
+            and len(there) == len(wanted)
+            and all(any(_holds(part, value) for part in there) for value in wanted)
+        )
+    return there == wanted
 
 
 # --- devices and registrations ----------------------------------------------------
 
 
 async def provision(
-    agent: IotAgentClient,
-    orion: OrionClient,
-    robots: Sequence[str],
-    apikey: str,
-    cbroker_url: str,
-    tiles: Sequence[Tile] = (),
+    agent: IotAgentClient, orion: OrionClient, site: FiwareSite
 ) -> Reconciled:
     """Make group, devices and command registrations of a fleet what they should be.
-
-    Args:
-        agent: The IoT Agent.
-        orion: Where the registrations of commands are.
-        robots: The fleet.
-        apikey: First part of every topic.
-        cbroker_url: Orion as the agent reaches it.
-        tiles: Of other equipment, whose devices are made where they name one.
 
     Raises:
         HopError: a neighbour does not answer or does not take something.
     """
-    mended = await _ensure_group(agent, apikey, cbroker_url)
+    robots, apikey = site.robots, site.apikey
+    group = write_group(apikey, site.context_broker_url)
+    mended = [f"Made the group of API key {apikey}."]
+    if not await agent.create_group(group):
+        mended = []
+        # The agent never shows the address of its broker, so it is always sent again.
+        sent = ("entity_type", "cbroker", "autoprovision")
+        await agent.change_group(apikey, {name: group[name] for name in sent})
     known = {
         str(device.get("device_id")): device for device in await agent.read_devices()
     }
-    for device in _devices_of_others(tiles, apikey):
+    for device in _devices_of_others(site.tiles, apikey):
         mended += await _ensure_device(agent, known, device)
     for robot_id in robots:
         mended += await _ensure_robot(agent, orion, known, robot_id, apikey)
@@ -76,25 +107,7 @@ async def provision(
     probe = names.HEARTBEAT_ID, names.HEARTBEAT_ID, names.HEARTBEAT_TYPE
     heartbeat = write_device(*probe, (("probe", "object"),), apikey)
     mended += await _ensure_device(agent, known, heartbeat)
-    mended += await _remove_strays(orion, known.values(), robots)
     return Reconciled(tuple(mended), tuple(_conflicts(known.values(), robots)))
-
-
-async def _ensure_group(
-    agent: IotAgentClient, apikey: str, cbroker_url: str
-) -> list[str]:
-    wanted = write_group(apikey, cbroker_url)
-    if await agent.create_group(wanted):
-        return [f"Made the group of API key {apikey}."]
-    groups = [
-        group for group in await agent.read_groups() if group.get("apikey") == apikey
-    ]
-    # The agent never shows the address of its broker, so it is always sent again.
-    sent = ("entity_type", "cbroker", "autoprovision")
-    await agent.change_group(apikey, {name: wanted[name] for name in sent})
-    if any(group.get("entity_type") == names.ROBOT_TYPE for group in groups):
-        return []
-    return [f"Corrected the entity type of the group of API key {apikey}."]
 
 
 async def _ensure_robot(
@@ -139,36 +152,25 @@ async def _ensure_device(
 ) -> list[str]:
     device_id = wanted["device_id"]
     there = known.get(device_id)
-    if there is not None and not anew and _shape(there) == _shape(wanted):
-        return []
     if there is not None:
+        if not anew and _holds(_as_read(there), wanted):
+            return []
         await agent.delete_device(device_id)
     if not await agent.create_device(wanted):
         # Somebody else made it in between, or it hid under another tenancy.
         await agent.delete_device(device_id)
-        if not await agent.create_device(wanted):
-            raise HopError("iot_agent", f"does not take device {device_id}")
+        raise HopError("iot_agent", f"did not take device {device_id} at once")
     known[device_id] = wanted
     return [f"{'Made' if there is None else 'Made anew'} device {device_id}."]
 
 
-def _shape(device: Document) -> tuple[object, ...]:
-    """The parts of a device that must be as wanted."""
-    return (
-        *map(device.get, ("apikey", "entity_name", "entity_type", "transport")),
-        sorted(
-            (
-                attribute.get("object_id") or attribute["name"],
-                attribute["name"],
-                attribute.get("type"),
-            )
-            for attribute in device.get("attributes", [])
-        ),
-        sorted(
-            (command["name"], command.get("type"))
-            for command in device.get("commands", [])
-        ),
-    )
+def _as_read(device: Document) -> Document:
+    """A device as the agent says it, with what it may leave out."""
+    attributes = [
+        {"object_id": one["name"]} | {k: v for k, v in one.items() if v is not None}
+        for one in device.get("attributes", [])
+    ]
+    return device | {"attributes": attributes, "protocol": names.PROTOCOL}
 
 
 async def _clear_registration(orion: OrionClient, robot_id: str) -> list[str]:
@@ -230,42 +232,11 @@ def _devices_of_others(tiles: Sequence[Tile], apikey: str) -> Iterator[Document]
         yield write_device(name, entity, kind, attributes, apikey)
 
 
-_AT_ONCE = 50
-"""Ids in one question: an address has a longest length."""
-
-
-async def _remove_strays(
-    orion: OrionClient, devices: Iterable[Document], robots: Iterable[str]
-) -> list[str]:
-    """Remove the entities that an agent made up and that no device of ours feeds.
-
-    A measure of an unknown device made an entity ``{type}:{device_id}``, such as
-    ``Robot:AGI_odom``, while an agent with its registry in memory had forgotten our
-    devices.  Our group forbids that now (``autoprovision``).
-    """
-    ids = [robot + device.suffix for robot in robots for device in names.ROBOT_DEVICES]
-    ids += [names.CLIMATE_DEVICE, names.HEARTBEAT_ID]
-    fed = {str(device.get("entity_name")) for device in devices}
-    strays = [
-        entity
-        for entity in (f"{names.ROBOT_TYPE}:{i}" for i in ids)
-        if entity not in fed
-    ]
-    removed = []
-    for start in range(0, len(strays), _AT_ONCE):
-        for entity_id, kind in await orion.find_entities(strays[start:][:_AT_ONCE]):
-            await orion.delete_entity(entity_id, kind)
-            removed.append(
-                f"Removed entity {entity_id}, which no device of ours feeds."
-            )
-    return removed
-
-
 # --- subscriptions ----------------------------------------------------------------
 
 PREFIX = "iVeg: "
 """Begins the description of our subscriptions, by which they are found again."""
-TOKEN_HEADER = "X-Iveg-Notify-Token"  # noqa: S105 - a header's name
+TOKEN_HEADER = "x-iveg-notify-token"  # noqa: S105 - a header's name
 _SCANS = KIND_OF[LaserScan].name
 CLIMATE = ("temperature", "relativeHumidity", "co2")
 _TIMEOUT_MS = 2000
@@ -373,23 +344,17 @@ async def ensure_subscriptions(
     Raises:
         HopError: Orion does not answer or does not take one.
     """
-    kept = await orion.read_subscriptions()
     ours = [
         subscription
-        for subscription in kept
+        for subscription in await orion.read_subscriptions()
         if str(subscription.get("description", "")).startswith(PREFIX)
     ]
-    failing, secrets = describe_failures(ours), frozenset(map(_secret_of, ours))
-    documents = [write_subscription(want, notify_url, token) for want in wanted]
     spare = {str(subscription["id"]): subscription for subscription in ours}
+    failing, secrets = describe_failures(ours), frozenset(map(_secret_of, ours))
     ids, mended = [], []
-    for document in documents:
-        there = [
-            subscription
-            for subscription in ours
-            if subscription["description"] == document["description"]
-        ]
-        subscription_id, done = await _ensure(orion, document, there)
+    for want in wanted:
+        document = write_subscription(want, notify_url, token)
+        subscription_id, done = await _ensure(orion, document, spare)
         spare.pop(subscription_id, None)
         ids.append(subscription_id)
         mended += done
@@ -400,9 +365,6 @@ async def ensure_subscriptions(
     return Reconciled(
         tuple(mended),
         ids=frozenset(ids),
-        former_ids=frozenset(
-            str(subscription["id"]) for subscription in ours
-        ).difference(ids),
         former_secrets=secrets - {token, ""},
         failing=failing,
     )
@@ -422,55 +384,41 @@ def describe_failures(subscriptions: Sequence[Document]) -> str:
 
 
 async def _ensure(
-    orion: OrionClient, wanted: Document, there: Sequence[Document]
+    orion: OrionClient, wanted: Document, ours: Mapping[str, Document]
 ) -> tuple[str, list[str]]:
     """Id of the one that is kept, corrected or made, and what was done."""
-    name = wanted["description"].removeprefix(PREFIX)
+    name, limits = wanted["description"], _limits(wanted)
     # Not every Orion takes a limit away by a change: another is made instead.
-    usable = [
-        subscription
-        for subscription in there
-        if _limits(subscription) == _limits(wanted)
-    ]
-    if not usable:
-        return await orion.create_subscription(wanted), [f"Subscribed to {name}."]
-    subscription_id = str(usable[0]["id"])
-    if _wiring(usable[0]) == _wiring({**wanted, "status": "active"}):
-        return subscription_id, []
-    await orion.update_subscription(subscription_id, {**wanted, "status": "active"})
-    return subscription_id, [f"Corrected the subscription to {name}."]
-
-
-def _limits(subscription: Document) -> tuple[object, object]:
-    return subscription.get("throttling") or 0, subscription.get("expires") or None
-
-
-def _wiring(subscription: Document) -> tuple[object, ...]:
-    """The parts of a subscription that must be as wanted."""
-    subject = subscription.get("subject", {})
-    notification = subscription.get("notification", {})
-    receiver = notification.get("httpCustom", {})
-    return (
-        subscription.get("status"),
-        subject.get("entities"),
-        subject.get("condition", {}).get("attrs"),
-        notification.get("maxFailsLimit"),
-        notification.get("attrs"),
-        notification.get("attrsFormat"),
-        receiver.get("url"),
-        receiver.get("timeout"),
-        _headers(receiver),
+    usable = (
+        subscription_id
+        for subscription_id, subscription in ours.items()
+        if subscription["description"] == name and _limits(subscription) == limits
     )
+    subscription_id = next(usable, None)
+    if subscription_id is None:
+        made = await orion.create_subscription(wanted)
+        return made, [f"Subscribed to {name.removeprefix(PREFIX)}."]
+    active = wanted | {"status": "active"}
+    if _holds(ours[subscription_id], active):
+        return subscription_id, []
+    await orion.update_subscription(subscription_id, active)
+    return subscription_id, [
+        f"Corrected the subscription to {name.removeprefix(PREFIX)}."
+    ]
 
 
-def _headers(receiver: Document) -> dict[str, Any]:
-    return {name.lower(): value for name, value in receiver.get("headers", {}).items()}
+def _limits(subscription: Document) -> tuple[object, ...]:
+    """Throttling, end and most failures, each None where there is none."""
+    failures = subscription.get("notification", {}).get("maxFailsLimit")
+    parts = subscription.get("throttling"), subscription.get("expires"), failures
+    return tuple(part or None for part in parts)
 
 
 def _secret_of(subscription: Document) -> str:
     """The secret that its notifications bring; empty for none."""
     receiver = subscription.get("notification", {}).get("httpCustom", {})
-    return str(_headers(receiver).get(TOKEN_HEADER.lower(), ""))
+    headers = {name.lower(): text for name, text in receiver.get("headers", {}).items()}
+    return str(headers.get(TOKEN_HEADER, ""))
 
 
 def write_subscription(

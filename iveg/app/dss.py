@@ -11,6 +11,7 @@ import secrets
 from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -27,7 +28,7 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.loop_watch import watch_loop
 from iveg.adapters.messages import AppriseSender, load_messages
-from iveg.adapters.provisioner import FiwareSite, Provisioner
+from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.recordings.pictures import PictureFiles
 from iveg.adapters.recordings.recorder import PART as RECORDINGS
 from iveg.adapters.recordings.recorder import RecordedSink
@@ -35,7 +36,7 @@ from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.adapters.worker import PACK_LIMIT_S, Worker
 from iveg.app.accounts import PART as ACCOUNTS
 from iveg.app.accounts import Accounts
-from iveg.app.outside import Outside, open_outside
+from iveg.app.outside import Outside, open_outside, site_of
 from iveg.comfort.equipment import PART as EQUIPMENT
 from iveg.comfort.equipment import TICK_S as EQUIPMENT_TICK_S
 from iveg.comfort.maps import COVERAGE_TICK_S, SCAN_TICK_S
@@ -195,23 +196,15 @@ class Dss:
         )
 
     def _provisioner(self) -> Provisioner:
-        settings, outside = self.settings, self.outside
+        outside, core = self.outside, self.core
+        secret = self.notify_secret.current
         return Provisioner(
             outside.orion,
             outside.agent,
             outside.link,
-            self.core.health_monitor,
+            core.health_monitor,
             self.pipeline.ingest,
-            FiwareSite(
-                self.fleet.ids,
-                settings.apikey,
-                context_broker_url=settings.iota_cb_url or settings.orion_url,
-                notify_url=settings.notify_address,
-                notify_token=self.notify_secret.current,
-                boot=self.core.boot,
-                tiles=self.pipeline.equipment.equipment.tiles,
-                scanned=self.fleet.ids if settings.direct_read == "all" else (),
-            ),
+            replace(site_of(self.settings), notify_token=secret, boot=core.boot),
         )
 
     def _web(self, *, demo: bool) -> WebParts:

@@ -9,9 +9,11 @@ from pydantic import TypeAdapter
 from iveg.adapters import clock
 from iveg.adapters.access_file import AccessFile
 from iveg.adapters.bounded_json import BoundedJson
+from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.extras import require_extra
 from iveg.adapters.files import FileByRobot
 from iveg.adapters.fiware_http import HOP, FiwareToken, TokenGrant
+from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.history.engine import history_url, sqlite_file
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, spilled_file
@@ -21,6 +23,7 @@ from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.journal import FileJournal
 from iveg.adapters.mqtt import BrokerAddress, MqttLink, TlsFiles
 from iveg.adapters.orion import OrionClient
+from iveg.adapters.reconciler import FiwareSite
 from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import WriterSetup
 from iveg.adapters.rules import FileRules, FileTrials
@@ -206,6 +209,19 @@ def open_fiware(settings: Settings) -> tuple[OrionClient, IotAgentClient]:
     return (
         OrionClient(settings.orion_url, *tenant, access),
         IotAgentClient(settings.iota_url, *tenant, access),
+    )
+
+
+def site_of(settings: Settings) -> FiwareSite:
+    """Facts of the settings that FIWARE should know."""
+    robots = load_fleet(settings.fleet, settings.robots).ids
+    return FiwareSite(
+        robots,
+        settings.apikey,
+        settings.iota_cb_url or settings.orion_url,
+        load_equipment(settings.equipment, robots),
+        robots if settings.direct_read == "all" else (),
+        settings.notify_address,
     )
 
 

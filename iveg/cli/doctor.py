@@ -14,13 +14,11 @@ from pathlib import Path
 
 from iveg.adapters import clock
 from iveg.adapters.database_check import check_database
-from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.fiware_http import FiwareHttp
-from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.mqtt import publish_and_hear
 from iveg.adapters.reconciler import PREFIX, describe_failures, provision
-from iveg.app.outside import open_fiware
+from iveg.app.outside import open_fiware, site_of
 from iveg.cli.arguments import CommandCall
 from iveg.cli.nodes import broker_of
 from iveg.cli.running import page_address, run_until_stopped
@@ -155,17 +153,8 @@ class _Path:
 
     async def send_measure(self) -> Finding:
         """Repair the devices, then send a probe and wait until Orion has it."""
-        settings = self._settings
-        robots = load_fleet(settings.fleet, settings.robots).ids
         await self._agent.version()
-        await provision(
-            self._agent,
-            self.orion,
-            robots=robots,
-            apikey=settings.apikey,
-            cbroker_url=settings.iota_cb_url or settings.orion_url,
-            tiles=load_equipment(settings.equipment, robots),
-        )
+        await provision(self._agent, self.orion, site_of(self._settings))
         began, stamp = clock.mono(), await self.publish_probe()
         # Orion is polled: notifications are tested by another hop.
         while not await self._has_probe(stamp):  # noqa: ASYNC110

@@ -5,7 +5,7 @@ at its members.  Names are those of ``nav_msgs``, ``sensor_msgs`` and the NGSI e
 times are Unix seconds unless said otherwise.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
@@ -447,29 +447,6 @@ class HeartbeatProbe(Observation):
     robot_id: str = field(default="", init=False)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class UnreadScan(Observation):
-    """A scan of which only the identity is read: nothing else of it slows a robot.
-
-    Attributes:
-        read: The scan.  Raises UnreadableError.
-    """
-
-    read: Callable[[], LaserScan]
-
-
-@dataclass(frozen=True, slots=True)
-class Overtaken(Observation):
-    """A message older than its stream, reduced to its identity.
-
-    A twin or straggler changes no pose and no scan, so its numbers are not read.  This
-    holds for odometry and scans alone: the content of a late detection frame may still
-    protect somebody.
-    """
-
-    kind: "type[Odometry | LaserScan | DetectionFrame]"
-
-
 @dataclass(frozen=True, slots=True)
 class RefusedFrame(Observation):
     """A detection frame that came and could not be read: somebody may be in it."""
@@ -479,13 +456,8 @@ class RefusedFrame(Observation):
 
 def kind_of(observation: Observation) -> type[Observation]:
     """The stream of its robot that an observation belongs to."""
-    match observation:
-        case Overtaken():
-            return observation.kind
-        case RefusedFrame():
-            return DetectionFrame
-        case UnreadScan():
-            return LaserScan
+    if isinstance(observation, RefusedFrame):
+        return DetectionFrame
     return type(observation)
 
 

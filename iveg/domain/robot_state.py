@@ -27,10 +27,8 @@ from iveg.domain.observations import (
     Observation,
     Odometry,
     Origin,
-    Overtaken,
     Received,
     SafetyReport,
-    UnreadScan,
     kind_of,
 )
 from iveg.domain.stream_order import OrderVerdict, PresentBoot, StreamOrder
@@ -148,7 +146,7 @@ class RobotState:
     estimated_since: float | None = None
     unproven_since: float | None = None
     alive_since: float | None = None
-    scan: LaserScan | UnreadScan | None = None
+    scan: LaserScan | None = None
     scan_pose: Pose2D | None = None
     scan_received: Instant | None = None
     frame: DetectionFrame | None = None
@@ -298,19 +296,7 @@ class RobotState:
             is_earlier |= self.present_boot.is_past(origin.boot, proven_at)
         if is_earlier and order.knows_better_than(origin):
             return "late"
-        verdict = order.judge(origin, received.at.mono, proven_at)
-        if verdict == "new" and isinstance(received.observation, Overtaken):
-            # Its stream was past it, and has since met sixteen other boots.
-            return "late"
-        return verdict
-
-    def is_past(self, kind: type[Observation], boot: str, seq: int) -> bool:
-        """Whether a message of this identity cannot be new."""
-        order = self._orders.get(kind)
-        if order is None:
-            return False
-        is_look = kind is DetectionFrame
-        return order.is_twin(boot, seq) if is_look else order.is_past(boot, seq)
+        return order.judge(origin, received.at.mono, proven_at)
 
     def is_newest(self, kind: type[Observation], origin: Origin) -> bool:
         """Whether nothing newer than this message is known."""
@@ -356,7 +342,7 @@ def apply_newest(robot: RobotState, received: Received, moment: float | None) ->
     match observation:
         case Odometry():
             _drive(robot, observation, received, moment)
-        case LaserScan() | UnreadScan():
+        case LaserScan():
             robot.scan, robot.scan_received = observation, dated(at, moment)
             robot.scan_pose = robot.pose_at_stamp(observation.origin.own_s)
         case DetectionFrame():

@@ -83,14 +83,6 @@ class StreamOrder:
         """Whether a record is of an earlier boot and must not be judged."""
         return self.boot is not None and origin.boot != self.boot
 
-    def is_past(self, boot: str, seq: int) -> bool:
-        """Whether :meth:`judge` will never call this message new."""
-        return boot == self.boot and seq <= self.seq
-
-    def is_twin(self, boot: str, seq: int) -> bool:
-        """Whether :meth:`judge` will call this message a duplicate."""
-        return boot == self.boot and seq in self._known
-
     def judge(
         self, origin: Origin, arrived: float = inf, proven_at: float | None = None
     ) -> OrderVerdict:

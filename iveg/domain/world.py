@@ -351,13 +351,6 @@ class World:
         """The transports of one kind of telemetry of a robot."""
         return self._feeds[robot_id, kind]
 
-    def is_past(
-        self, robot_id: str, kind: type[Observation], boot: str, seq: int
-    ) -> bool:
-        """Whether the identity of a message shows that it is old or a twin."""
-        robot = self.robots.get(robot_id)
-        return robot is not None and robot.is_past(kind, boot, seq)
-
     def is_refused(self, robot_id: str) -> bool:
         """Whether a setting says that a robot is not heard."""
         robot = self.robots.get(robot_id)

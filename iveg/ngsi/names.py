@@ -20,6 +20,8 @@ ROBOT_TYPE = "Robot"
 CLIMATE_ID, CLIMATE_TYPE = "greenhouse-climate", "IndoorEnvironmentObserved"
 HEARTBEAT_ID, HEARTBEAT_TYPE = "iveg-canary", "Probe"
 CLIMATE_DEVICE = "climate"
+PROTOCOL = "JSON"
+"""Of the IoT Agent."""
 
 
 def _attributes(of: type[Observation]) -> list[str]:

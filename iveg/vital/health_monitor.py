@@ -49,27 +49,6 @@ class HopHealth:
     growing: bool = False
 
 
-@dataclass(slots=True)
-class Pace:
-    """Response time of a service.
-
-    One slow answer is a hiccup, of a disk or of a busy machine: it is shown, and it is
-    a fault only when the next is slow as well.
-    """
-
-    slow: int = 0
-
-    def took(self, spent_s: float) -> str:
-        """Problem shown by the newest response time (s); empty for none."""
-        self.slow = self.slow + 1 if spent_s > SLOW_S else 0
-        return f"answers take {spent_s:.1f} s" if self.slow else ""
-
-    @property
-    def is_fault(self) -> bool:
-        """Whether two answers in a row were slow."""
-        return self.slow > 1
-
-
 class HealthMonitor:
     """Collects the evidence about each hop.
 

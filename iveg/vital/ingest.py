@@ -8,7 +8,6 @@ be read: somebody may have been in it.
 
 import asyncio
 import logging
-import math
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -18,7 +17,6 @@ from iveg.domain.kinds import KIND_OF, KINDS
 from iveg.domain.observations import (
     DetectionFrame,
     Observation,
-    Overtaken,
     Received,
     RefusedFrame,
     kind_of,
@@ -57,8 +55,6 @@ class Ingest:
         self._queue: deque[Received] = deque()
         self._refused: dict[str, Received] = {}
         """By robot, that one of its detection frames was dropped."""
-        self._identities: set[_Identity] = set()
-        """Of what waits and was counted by its sender."""
         self._waiting: Counter[_Stream] = Counter()
         """How much waits, by robot and kind."""
         self._due: dict[_Stream, float] = {}
@@ -92,15 +88,10 @@ class Ingest:
                 return
         elif not isinstance(received.observation, RefusedFrame):
             self._passed(received)
-        if _is_twin_of_a_picture(received.observation):
-            self.counters[f"{name}.duplicate"] += 1
-            return
         stream = _stream(received)
         if self._waiting[stream] >= MOST_WAITING:
             self._drop_oldest(stream)
         self._queue.append(received)
-        if not received.asked:
-            self._identities.add(_identity(received.observation))
         self._waiting[stream] += 1
         self._wake.set()
 
@@ -132,25 +123,6 @@ class Ingest:
         if (seq or 0) > first:
             self._first[stream] = _GOES_ON
         return (seq or 0) <= first
-
-    def is_past(
-        self,
-        robot_id: str,
-        kind: type[Observation],
-        boot: str,
-        seq: int,
-        now: float = math.inf,
-    ) -> bool:
-        """Whether a message cannot be news: it is here, or a later one was taken.
-
-        Nor is it what comes too soon after a direct one of a kind that is only drawn
-        (``now`` monotonic, s).
-        """
-        return (
-            (robot_id, kind, boot, seq) in self._identities
-            or now < self._due.get((robot_id, kind), 0.0)
-            or self._world.is_past(robot_id, kind, boot, seq)
-        )
 
     def is_early(self, robot_id: str, kind: type[Observation], now: float) -> bool:
         """Whether nobody would look at it: one of its kind was read a moment ago."""
@@ -210,7 +182,6 @@ class Ingest:
 
     def _forget(self, received: Received) -> None:
         stream = _stream(received)
-        self._identities.discard(_identity(received.observation))
         self._waiting[stream] -= 1
 
 
@@ -222,17 +193,6 @@ def _identity(observation: Observation) -> _Identity:
     """Identity of a message, where its sender counts."""
     origin = observation.origin
     return observation.robot_id, kind_of(observation), origin.boot, origin.seq
-
-
-def _is_twin_of_a_picture(observation: Observation) -> bool:
-    """Whether nothing follows from it but a count.
-
-    A copy of odometry or of a scan says which transport feeds the robot; one that calls
-    itself a replay is refused, and an alert says so.
-    """
-    if not isinstance(observation, Overtaken) or observation.origin.replay is not None:
-        return False
-    return observation.kind is DetectionFrame
 
 
 def _stream(received: Received) -> _Stream:

@@ -5,9 +5,8 @@ its own limit and secret.  Refusals look like those of the rest of the applicati
 """
 
 import asyncio
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Final, Protocol
 
 from starlette.responses import Response
@@ -15,7 +14,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.observations import EntityReading, Instant, Observation, Received
+from iveg.domain.observations import EntityReading, Instant, Received
 from iveg.domain.transports import FIWARE
 from iveg.ngsi.codec import read_notification
 from iveg.vital.ingest import Ingest
@@ -50,13 +49,13 @@ class Followers:
         notified: Each notification of Orion's came then.
         equipment: Id and type of the entities that ``measured`` is told of.
         measured: A reading of other equipment.
-        recorded: Each body that is read, and what is observed in it.
+        recorded: Each body that is read.
     """
 
     notified: Callable[[Instant], None]
     equipment: Container[tuple[str, str]]
     measured: Callable[[EntityReading, Instant], None]
-    recorded: Callable[[bytes, Instant, Sequence[Observation]], None]
+    recorded: Callable[[bytes, Instant], None]
 
 
 class NotificationEndpoint:
@@ -140,18 +139,14 @@ class NotificationEndpoint:
         """Take a body that has just come; what is wrong with it, or None."""
         at, followers = self._clock(), self._followers
         try:
-            subscription_id, reading = read_notification(
-                body,
-                partial(self._ingest.is_past, now=at.mono),
-                followers.equipment,
-            )
+            subscription_id, reading = read_notification(body, followers.equipment)
         except UnreadableError as error:
             return problem_of(error)
         if not self._subscriptions.is_ours(subscription_id):
             self._ingest.reject(subscription_id, "unknown_subscription")
             return None
         followers.notified(at)
-        followers.recorded(body, at, reading.observations)
+        followers.recorded(body, at)
         for problem in reading.problems:
             self._ingest.reject(problem.source, problem.reason, problem.detail)
         for entity in reading.equipment:

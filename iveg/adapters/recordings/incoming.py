@@ -4,15 +4,14 @@ An input is a line of JSON and a payload, so that the loop packs it in a microse
 nothing is read before it is in the other process.
 """
 
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from enum import IntEnum
 from typing import BinaryIO, Final, NamedTuple
 
 import orjson
 
 from iveg.adapters.recordings.mcap_file import Channel
-from iveg.domain.observations import Instant, LaserScan, Observation, Overtaken
+from iveg.domain.observations import Instant
 
 NOTIFICATIONS = Channel("/ngsi/notifications", "ngsi.Notification")
 PICTURES = Channel("/iveg/pictures", "iveg.Picture")
@@ -20,8 +19,6 @@ WHOLE_S: Final = 10.0
 """Between two whole pictures."""
 WHOLE, CHANGED = b'{"whole":true,', b'{"whole":false,'
 """How a picture begins."""
-_NUMBERS = re.compile(rb"\[[-+.,\deE\snul]{100,}\]")
-"""A long list of numbers in JSON."""
 
 
 class Sort(IntEnum):
@@ -61,18 +58,6 @@ def pack(sort: Sort, at: Instant, name: str = "", payload: bytes = b"") -> bytes
     """An input as bytes."""
     head = orjson.dumps([sort, at.mono, at.wall, name, len(payload)])
     return b"".join((head, b"\n", payload))
-
-
-def worth_keeping(body: bytes, observed: Sequence[Observation]) -> bytes:
-    """A notification without numbers that are kept already.
-
-    Of a scan that its twin has overtaken nothing but its identity was read, and nothing
-    else is recorded: its numbers are those of its twin.
-    """
-    are_twins = bool(observed) and all(
-        isinstance(one, Overtaken) and one.kind is LaserScan for one in observed
-    )
-    return _NUMBERS.sub(b"[]", body) if are_twins else body
 
 
 def unpack(stream: BinaryIO) -> Iterator[Incoming]:

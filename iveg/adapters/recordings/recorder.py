@@ -21,13 +21,13 @@ import orjson
 
 import iveg
 from iveg.adapters.files import disk_space
-from iveg.adapters.recordings.incoming import Sort, pack, worth_keeping
+from iveg.adapters.recordings.incoming import Sort, pack
 from iveg.adapters.recordings.mcap_file import finish_broken, write_excerpt
 from iveg.adapters.recordings.writer import PRUNE_S, SETUP, WriterSetup
 from iveg.adapters.worker import Worker
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError
-from iveg.domain.observations import Instant, Observation
+from iveg.domain.observations import Instant
 from iveg.domain.recordings import RecordingFile
 from iveg.domain.records import Record, is_telemetry
 from iveg.domain.retention import DiskSpace
@@ -203,12 +203,10 @@ class InputRecorder:
         if self._is_on:
             self._queue(pack(Sort.MEASURE, at, topic, payload))
 
-    def notification(
-        self, body: bytes, at: Instant, observed: Sequence[Observation]
-    ) -> None:
-        """A notification of Orion's, and what was read in it."""
+    def notification(self, body: bytes, at: Instant) -> None:
+        """A notification of Orion's."""
         if self._is_on:
-            self._queue(pack(Sort.NOTIFICATION, at, "", worth_keeping(body, observed)))
+            self._queue(pack(Sort.NOTIFICATION, at, "", body))
 
     def row(self, record: Record) -> None:
         """A row of the history; telemetry is here already, as it came."""

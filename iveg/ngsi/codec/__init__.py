@@ -13,7 +13,6 @@ from iveg.ngsi.codec.feedback import (
 )
 from iveg.ngsi.codec.fields import MAX_DEPTH, ReadResult, UnreadPart, load_json
 from iveg.ngsi.codec.incoming import (
-    IsPast,
     read_answer,
     read_attributes,
     read_entity,
@@ -36,7 +35,6 @@ from iveg.ngsi.codec.outgoing import (
 __all__ = [
     "MAX_DEPTH",
     "FeedbackWriter",
-    "IsPast",
     "ReadResult",
     "UnreadPart",
     "format_stamp",

@@ -34,10 +34,8 @@ from iveg.domain.observations import (
     Observation,
     Odometry,
     Origin,
-    Overtaken,
     RefusedFrame,
     SafetyReport,
-    UnreadScan,
 )
 from iveg.domain.wire import (
     MAX_BEAMS,
@@ -65,8 +63,6 @@ from iveg.ngsi.codec.fields import (
 )
 
 Reader = Callable[[str, Mapping[str, object]], Observation]
-IsPast = Callable[[str, type[Observation], str, int], bool]
-"""Whether robot, kind, boot and seq tell that a message cannot be news."""
 
 # --- detection frames -------------------------------------------------------------
 
@@ -260,31 +256,6 @@ def _refuse_elsewhere(robot_id: str, header: object) -> None:
         raise UnreadableError("unknown_frame", f"{names.LIDAR}: {frame}")
 
 
-def _identify_scan(
-    points: str, robot_id: str, attributes: Mapping[str, object]
-) -> UnreadScan:
-    """Read a scan's identity alone: its numbers are for eyes, which read them once."""
-    header = attributes.get(names.LIDAR_HEADER)
-    _refuse_elsewhere(robot_id, header)
-    origin = Origin() if header is None else read_origin(header)
-    kept = {points: _compact(attributes[points]), names.LIDAR_HEADER: header}
-    return UnreadScan(robot_id, origin, partial(_read_later, robot_id, kept))
-
-
-def _read_later(robot_id: str, attributes: Mapping[str, object]) -> LaserScan:
-    """The scan.
-
-    Raises:
-        UnreadableError: it is none.
-    """
-    reading = read_attributes(robot_id, attributes)
-    for scan in reading.observations:
-        if isinstance(scan, LaserScan):
-            return scan
-    (problem,) = reading.problems
-    raise UnreadableError(problem.reason, problem.detail)
-
-
 # --- attributes -------------------------------------------------------------------
 
 
@@ -331,59 +302,16 @@ _READERS: Mapping[str, Reader] = {
 }
 _RANK = {name: rank for rank, name in enumerate(_READERS)}
 _FRAMES = frozenset({names.BOXES, "class"})
-_IDENTIFIERS: Mapping[str, Reader] = {
-    name: partial(_identify_scan, name) for name in (names.LIDAR, "laser_scan")
-}
-_IDENTITY: Mapping[str, tuple[type[Odometry | LaserScan | DetectionFrame], str]] = {
-    names.ODOMETRY: (Odometry, names.ODOMETRY),
-    names.LIDAR: (LaserScan, names.LIDAR_HEADER),
-    names.BOXES: (DetectionFrame, names.BOXES_HEADER),
-}
-"""Attributes that carry the origin (boot, seq) of telemetry."""
 
 
-def read_attributes(
-    robot_id: str, attributes: Mapping[str, object], is_past: IsPast | None = None
-) -> ReadResult:
-    """Read every attribute of a robot that the contract knows; skip the others.
-
-    Args:
-        robot_id: Whose they are.
-        attributes: By name.
-        is_past: Tells by its identity what need not be read; numbers of scans are left
-            to those who draw them.  None reads all.
-    """
-    readings = []
-    for name in sorted(attributes.keys() & _READERS.keys(), key=_RANK.__getitem__):
-        if attributes[name] is None:
-            continue
-        reader = _READERS[name]
-        if is_past is not None:
-            reader = _IDENTIFIERS.get(name, reader)
-            if old := _overtaken(robot_id, name, attributes, is_past):
-                readings.append(old)
-                continue
-        readings.append(_read(robot_id, reader, attributes, name))
+def read_attributes(robot_id: str, attributes: Mapping[str, object]) -> ReadResult:
+    """Read every attribute of a robot that the contract knows; skip the others."""
+    readings = [
+        _read(robot_id, _READERS[name], attributes, name)
+        for name in sorted(attributes.keys() & _READERS.keys(), key=_RANK.__getitem__)
+        if attributes[name] is not None
+    ]
     return readings[0] if len(readings) == 1 else merge(readings)
-
-
-def _overtaken(
-    robot_id: str, name: str, attributes: Mapping[str, object], is_past: IsPast
-) -> ReadResult | None:
-    """Remains of a message that is older than its stream; None where it may be new."""
-    kind, holder = _IDENTITY.get(name, (None, ""))
-    raw = attributes.get(holder)
-    if kind is None or type(raw) is not dict:
-        return None
-    boot, seq = raw.get("boot"), raw.get("seq")
-    if type(boot) is not str or type(seq) is not int:
-        return None
-    if not is_past(robot_id, kind, clean_text(boot), seq):
-        return None
-    try:
-        return ReadResult((Overtaken(robot_id, read_origin(raw), kind),))
-    except ValidationError:
-        return None
 
 
 def _read(
@@ -415,15 +343,13 @@ _COMMAND = _declared(CommandAnswer, names.COMMAND)
 _GOAL = _declared(GoalAnswer, names.GOAL)
 
 
-def read_measure(
-    device_id: str, payload: bytes, is_past: IsPast | None = None
-) -> ReadResult:
+def read_measure(device_id: str, payload: bytes) -> ReadResult:
     """Read what a robot's device published on its ``attrs`` topic."""
     robot_id = names.robot_of_device(device_id)
     if not names.is_robot_id(robot_id):
         return unread(clean_text(device_id), "bad_robot_id")
     try:
-        return read_attributes(robot_id, _load_object(payload), is_past)
+        return read_attributes(robot_id, _load_object(payload))
     except UnreadableError as error:
         read = unread(device_id, error.reason, error.detail)
     is_frame = device_id == robot_id + _FRAME_SUFFIX
@@ -459,15 +385,12 @@ class _Notification(Wire):
 
 
 def read_notification(
-    body: bytes,
-    is_past: IsPast | None = None,
-    equipment: Container[tuple[str, str]] = frozenset(),
+    body: bytes, equipment: Container[tuple[str, str]] = frozenset()
 ) -> tuple[str, ReadResult]:
     """Read a notification, normalized or keyValues.
 
     Args:
         body: JSON.
-        is_past: As of :func:`read_attributes`.
         equipment: Id and type of entities whose attributes are handed on as they are.
 
     Returns:
@@ -480,14 +403,13 @@ def read_notification(
         notification = _Notification.model_validate(load_json(body))
     except ValidationError as error:
         raise UnreadableError("not_a_notification", first_complaint(error)) from error
-    entities = [read_entity(entity, is_past, equipment) for entity in notification.data]
+    entities = [read_entity(entity, equipment) for entity in notification.data]
     read = entities[0] if len(entities) == 1 else merge(entities)
     return notification.subscriptionId, read
 
 
 def read_entity(
     entity: Mapping[str, object],
-    is_past: IsPast | None = None,
     equipment: Container[tuple[str, str]] = frozenset(),
 ) -> ReadResult:
     """Read one NGSI-v2 entity in either representation."""
@@ -503,7 +425,7 @@ def read_entity(
     if entity_type == names.ROBOT_TYPE:
         if not names.is_robot_id(entity_id):
             return unread(clean_text(entity_id), "bad_robot_id")
-        return read_attributes(entity_id, attributes, is_past)
+        return read_attributes(entity_id, attributes)
     if identity == (names.CLIMATE_ID, names.CLIMATE_TYPE):
         return _read(entity_id, _read_climate, attributes, "entity")
     if identity == (names.HEARTBEAT_ID, names.HEARTBEAT_TYPE):

@@ -21,7 +21,6 @@ from iveg.domain.observations import (
     Observation,
     Odometry,
     Origin,
-    UnreadScan,
 )
 from iveg.domain.wire import (
     FORBIDDEN,
@@ -258,9 +257,8 @@ def _played(channel: Channel, payload: bytes) -> Iterator[Played]:
         else:
             return
         for one in observations:
-            read = one.read() if isinstance(one, UnreadScan) else one
-            if isinstance(read, get_args(Played)):
-                yield read
+            if isinstance(one, get_args(Played)):
+                yield one
     except UnreadableError:
         return
 

@@ -45,9 +45,6 @@ class Bench:
             scope,
         )
 
-    def is_past(self, *_: object) -> bool:
-        return False
-
     def is_early(self, robot_id: str, kind: type[Observation], now: float) -> bool:
         return self.ingest.is_early(robot_id, kind, now)
 

@@ -7,7 +7,7 @@ import pytest
 
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.reconciler import Reconciled, provision
+from iveg.adapters.reconciler import FiwareSite, Reconciled, provision
 from iveg.lab.embedded.context_broker import Registration
 from iveg.lab.embedded.entities import new_id
 from iveg.lab.embedded.server import Running, embedded_fiware
@@ -27,7 +27,7 @@ class Site:
 
     async def provision(self, *robots: str) -> Reconciled:
         return await provision(
-            self.agent, self.orion, robots, "iveg", self.up.orion_url
+            self.agent, self.orion, FiwareSite(robots, "iveg", self.up.orion_url)
         )
 
     async def command_arrives(self, robot_id: str) -> bool:
@@ -84,22 +84,9 @@ async def test_an_agent_that_forgot_our_devices_leaves_no_entities_of_its_own(
         await site.agent.delete_device("AGI" + device.suffix)
     site.up.agent.hear("/iveg/AGI_odom/attrs", b'{"base_pose_ground_truth":{}}')
 
-    assert await site.orion.find_entities(["Robot:AGI_odom"]) == []
+    robots = await site.orion.read_robots()
+    assert "Robot:AGI_odom" not in {robot["id"] for robot in robots}
     assert "AGI_odom" not in str(await site.agent.read_devices())
-
-
-async def test_entities_that_an_agent_once_made_up_are_removed(site: Site) -> None:
-    made_up = ["Robot:AGI_odom", "Robot:somebody"]
-    for entity_id in made_up:
-        body = {"id": entity_id, "type": "Robot"}
-        await site.orion.ask("POST", "/v2/entities", body=body)
-    assert len(await site.orion.find_entities(made_up)) == 2
-
-    mended = (await site.provision("AGI")).mended
-
-    assert await site.orion.find_entities(made_up) == [("Robot:somebody", "Robot")]
-    assert "Removed entity Robot:AGI_odom, which no device of ours feeds." in mended
-    assert (await site.provision("AGI")).mended == ()
 
 
 async def test_a_command_that_was_never_registered_gets_its_road(site: Site) -> None:

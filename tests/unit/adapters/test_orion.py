@@ -6,7 +6,7 @@ import pytest
 from iveg.adapters import fiware_http
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.reconciler import provision
+from iveg.adapters.reconciler import FiwareSite, provision
 from iveg.domain.errors import HopError
 from iveg.lab.embedded.server import Running
 from tests.faulty_fiware import faulty_fiware
@@ -47,7 +47,7 @@ async def test_reading_robots_never_waits_for_a_stuck_agent(
     up: Running, orion: OrionClient
 ) -> None:
     async with IotAgentClient(up.iota_url, *TENANT) as agent:
-        await provision(agent, orion, ["AGI"], "iveg", up.orion_url)
+        await provision(agent, orion, FiwareSite(["AGI"], "iveg", up.orion_url))
         await put(orion, "AGI", base_pose_ground_truth=ODOMETRY)
         await agent.ask("POST", "/test/faults", body={"stuck": True})
         async with asyncio.timeout(30):

@@ -13,8 +13,8 @@ from iveg.adapters.fiware_http import HOP, Document, FiwareToken, TokenGrant
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.provisioner import FiwareSite, Provisioner
-from iveg.adapters.reconciler import ensure_subscriptions, wanted_for
+from iveg.adapters.provisioner import Provisioner
+from iveg.adapters.reconciler import FiwareSite, ensure_subscriptions, wanted_for
 from iveg.domain.observations import Odometry, Origin, Received
 from iveg.domain.world import World
 from iveg.lab.embedded.server import Running, embedded_fiware

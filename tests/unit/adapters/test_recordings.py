@@ -31,7 +31,7 @@ from iveg.adapters.recordings.recorder import (
 from iveg.adapters.recordings.writer import WriterSetup
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import DataFileError, HopError
-from iveg.domain.observations import Instant, LaserScan, Observation, Overtaken
+from iveg.domain.observations import Instant
 from iveg.domain.parameters import ByClass
 from iveg.domain.retention import DiskSpace
 from iveg.ngsi import codec
@@ -109,7 +109,7 @@ def privately(path: Path) -> list[tuple[str, float, bytes]]:
 async def test_what_came_in_is_there_byte_for_byte_with_its_time(site: Site) -> None:
     body = b'{ "subscriptionId": "1", "data": [] }'
     site.hear(0.0, b'{"x":  1}')
-    site.recorder.notification(body, at(0.125), ())
+    site.recorder.notification(body, at(0.125))
     site.write(0.3)
     site.close()
 
@@ -133,9 +133,9 @@ async def test_viewers_draw_poses_scans_and_boxes_thinned(site: Site) -> None:
         body = notification({"base_pose_ground_truth": pose})
         site.hear(n / 30, codec.write_measure(odometry(x=n, origin=origin(n))))
         # The copy by FIWARE is no second picture, and a stranger none at all.
-        site.recorder.notification(body, at(n / 30), [odometry()])
+        site.recorder.notification(body, at(n / 30))
         strange = notification({"base_pose_ground_truth": pose}, robot_id="B1")
-        site.recorder.notification(strange, at(n / 30), [odometry("B1")])
+        site.recorder.notification(strange, at(n / 30))
         site.hear(n / 30, looked, "/iveg/AGI_yolox_bounding_boxes/attrs")
         site.hear(n / 30, codec.write_measure(scan()), SCAN)
     site.hear(0.99, b'{"no": "scan"}', SCAN)
@@ -154,30 +154,6 @@ async def test_viewers_draw_poses_scans_and_boxes_thinned(site: Site) -> None:
     (box,) = values["foxglove.SceneUpdate"]["entities"]  # type: ignore[index]
     assert box["frame_id"] == "map"
     assert box["cubes"][0]["pose"]["position"] == {"x": 3.0, "y": 0.0, "z": 0.9}
-
-
-async def test_of_a_scan_that_its_twin_has_overtaken_no_numbers_are_kept(
-    site: Site,
-) -> None:
-    swept = scan(ranges=[2.5] * 360, angle_increment=0.01)
-    value = codec.write_measure(swept)
-    body = notification(orjson.loads(value))
-    twin = Overtaken("AGI", origin(), LaserScan)
-    site.hear(0.0, value, SCAN)
-    looks: list[list[Observation]] = [[twin], [twin, odometry()], [swept]]
-    for second, observed in enumerate(looks):
-        site.recorder.notification(body, at(second), observed)
-    site.write(3.0)
-    site.close()
-
-    kept = [one for topic, _, one in privately(site.only()) if topic == TWINS]
-    assert kept[1:] == [body, body]
-    told, whole = (orjson.loads(one)["data"][0] for one in (kept[0], body))
-    assert told["lidar_points"]["value"] == []
-    assert told | {"lidar_points": whole["lidar_points"]} == whole
-    # Of the twin without numbers viewers draw nothing, and the next one at once.
-    drawn = [schema for _, schema, _ in publicly(site.only())]
-    assert drawn.count("foxglove.LaserScan") == 3
 
 
 async def test_an_hour_has_a_file_of_its_own_and_a_clock_set_back_spoils_none(

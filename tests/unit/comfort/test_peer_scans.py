@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from iveg.comfort.maps import PeerScans, ScanReader
+from iveg.comfort.maps import PeerScans
 from iveg.domain.geometry import Pose2D
 from iveg.domain.peer_scan import PeerScan
 from tests.builders import at, safety_report, scan
@@ -17,8 +17,11 @@ class Field(Scene):
         super().__post_init__()
         self.told: list[PeerScan] = []
         self.refused: list[tuple[str, str, str]] = []
-        reader = ScanReader(lambda *one: self.refused.append(one))
-        self.part = PeerScans(self.world, reader, self.told.append, "b")
+        self.part = PeerScans(self.world, self.refuse, self.told.append, "b")
+
+    def refuse(self, *refused: str) -> None:
+        robot_id, reason, detail = refused
+        self.refused.append((robot_id, reason, detail))
 
     def laser(self, robot_id: str, *, placed: bool = True) -> None:
         robot = self.world.robot(robot_id)

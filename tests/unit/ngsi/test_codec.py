@@ -326,11 +326,10 @@ def test_a_scan_in_no_frame_of_its_robot_is_refused_by_name(frame: str) -> None:
     body = b'{"lidar_points": [1.0], "lidar_header": {"angle_min": 0, '
     body += b'"angle_increment": 0.1, "range_max": 9, "frame_id": "%b"}}'
 
-    for is_past in (None, lambda *_: False):
-        read = codec.read_measure("AGI_lidar2D", body % frame.encode(), is_past=is_past)
+    read = codec.read_measure("AGI_lidar2D", body % frame.encode())
 
-        assert read.observations == ()
-        assert [one.reason for one in read.problems] == ["unknown_frame"]
+    assert read.observations == ()
+    assert [one.reason for one in read.problems] == ["unknown_frame"]
 
 
 def test_robots_read_the_radii_of_the_rule_in_the_feedback() -> None:

@@ -4,7 +4,7 @@ import pytest
 
 from iveg.domain.observations import Origin
 from iveg.domain.probe import Hop
-from iveg.vital.health_monitor import HealthMonitor, HopHealth, Pace
+from iveg.vital.health_monitor import HealthMonitor, HopHealth
 from tests.builders import START, at
 
 
@@ -194,17 +194,3 @@ def test_what_orion_sent_before_an_outage_says_nothing_of_its_subscriptions() ->
 
     assert before == "unknown"
     assert states(monitor, 12.0)["notifications"] == "ok"
-
-
-def test_one_slow_answer_is_shown_and_two_in_a_row_are_a_fault() -> None:
-    pace = Pace()
-
-    told = [(pace.took(spent), pace.is_fault) for spent in (1.2, 0.2, 1.3, 2.0, 0.1)]
-
-    assert told == [
-        ("answers take 1.2 s", False),
-        ("", False),
-        ("answers take 1.3 s", False),
-        ("answers take 2.0 s", True),
-        ("", False),
-    ]

@@ -6,12 +6,8 @@ import pytest
 
 from iveg.domain.observations import (
     CommandAnswer,
-    DetectionFrame,
     Observation,
-    Odometry,
     Origin,
-    Overtaken,
-    Received,
     RefusedFrame,
 )
 from iveg.domain.transports import DIRECT
@@ -118,54 +114,6 @@ def test_what_was_asked_for_is_counted_apart_from_what_was_sent() -> None:
 
     counted = {"asked.Odometry": 1, "fiware.Odometry": 1, "direct.SafetyReport": 1}
     assert queue.counters == counted
-
-
-def test_a_message_that_waits_is_known_and_one_that_has_left_is_the_worlds() -> None:
-    queue = ingest()
-    queue.enqueue(received(detection_frame(origin=origin(7))))
-    waiting = queue.is_past("AGI", DetectionFrame, "boot-a", 7)
-    others = [
-        queue.is_past("AGI", DetectionFrame, "boot-a", 6),
-        queue.is_past("AGI", Odometry, "boot-a", 7),
-        queue.is_past("AGII", DetectionFrame, "boot-a", 7),
-    ]
-    list(queue.drain())
-
-    assert (waiting, others) == (True, [False] * 3)
-    assert not queue.is_past("AGI", DetectionFrame, "boot-a", 7)
-
-
-def test_what_orion_was_asked_for_hides_no_message() -> None:
-    queue = ingest()
-    queue.enqueue(replace(received(odometry(origin=origin(7))), asked=True))
-
-    assert not queue.is_past("AGI", Odometry, "boot-a", 7)
-
-
-def test_the_twin_of_a_picture_is_timed_and_counted_and_waits_for_nobody() -> None:
-    timed: list[Received] = []
-    queue = Ingest(World(("AGI",)), timed.append, ignore)
-    twin = received(Overtaken("AGI", origin(7), DetectionFrame))
-
-    queue.enqueue(twin)
-
-    assert (timed, queue.waiting) == ([twin], 0)
-    assert queue.counters["DetectionFrame.duplicate"] == 1
-
-
-@pytest.mark.parametrize(
-    "copy",
-    [
-        Overtaken("AGI", origin(7), Odometry),
-        Overtaken("AGI", replace(origin(7), replay="map"), DetectionFrame),
-    ],
-)
-def test_a_copy_that_the_world_must_know_of_waits_for_it(copy: Overtaken) -> None:
-    queue = ingest()
-
-    queue.enqueue(received(copy))
-
-    assert queue.waiting == 1
 
 
 def test_nobody_who_is_rejected_often_hides_the_rejection_of_another() -> None:

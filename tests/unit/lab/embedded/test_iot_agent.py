@@ -6,7 +6,7 @@ import pytest
 
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.reconciler import provision
+from iveg.adapters.reconciler import FiwareSite, provision
 from iveg.domain.errors import HopError
 from iveg.lab.embedded.context_broker import Registration
 from iveg.lab.embedded.entities import new_id
@@ -38,7 +38,7 @@ async def orion(up: Running) -> AsyncIterator[OrionClient]:
         OrionClient(up.orion_url, *TENANT) as orion,
         IotAgentClient(up.iota_url, *TENANT) as agent,
     ):
-        await provision(agent, orion, ["AGI"], "iveg", up.orion_url)
+        await provision(agent, orion, FiwareSite(["AGI"], "iveg", up.orion_url))
         yield orion
 
 
