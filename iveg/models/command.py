@@ -1,7 +1,7 @@
 """STOP, release and resume as people follow them, live and remembered."""
 
-from collections.abc import Iterable, Sequence
-from math import ceil, isfinite
+from collections.abc import Sequence
+from math import isfinite
 from typing import Annotated, Any, Self
 
 from pydantic import Field
@@ -270,73 +270,3 @@ class FleetPressed(Model):
     """
 
     commands: list[Pressed]
-
-
-class LatencySpread(Model):
-    """Times of one step (ms); null where nothing was measured.
-
-    Attributes:
-        count: Samples.
-        p50_ms: Null where nothing was measured (ms).
-        p95_ms: Null where nothing was measured (ms).
-        max_ms: Null where nothing was measured (ms).
-    """
-
-    count: int
-    p50_ms: Tenth | None
-    p95_ms: Tenth | None
-    max_ms: Tenth | None
-
-    @classmethod
-    def of(cls, values: Iterable[float | None]) -> Self:
-        """Spread of measured times, without missing ones."""
-        known = sorted(value for value in values if value is not None)
-        return cls(
-            count=len(known),
-            p50_ms=_nearest_rank(known, 0.50),
-            p95_ms=_nearest_rank(known, 0.95),
-            max_ms=_nearest_rank(known, 1.0),
-        )
-
-
-class RobotLatency(Model):
-    """One robot's STOPs: how many, and each step from the press on.
-
-    Attributes:
-        robot_id: The robot.
-        stops: How many.
-        accepted: Times of the step.
-        answer: By transport, until it left and until the robot answered.
-        standing: Times of the step.
-    """
-
-    robot_id: str
-    stops: int
-    accepted: LatencySpread
-    sent: dict[TransportId, LatencySpread] = Field(
-        description=(
-            "By transport, until it left; ``answer`` until the robot said that it has"
-            " it."
-        )
-    )
-    answer: dict[TransportId, LatencySpread]
-    standing: LatencySpread
-
-
-class Latency(Model):
-    """Times of the newest STOPs of a range.
-
-    Attributes:
-        since: The range.
-        until: The range.
-        robots: One for each robot.
-    """
-
-    since: Stamp
-    until: Stamp
-    robots: list[RobotLatency]
-
-
-def _nearest_rank(known: Sequence[float], share: float) -> float | None:
-    """Nearest-rank percentile of sorted values (``share`` 0 to 1); None without any."""
-    return known[max(0, ceil(share * len(known)) - 1)] if known else None

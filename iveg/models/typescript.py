@@ -18,7 +18,7 @@ from iveg.domain.records import Json
 from iveg.domain.situation import ORDER
 from iveg.models.access import Invitation, NewToken, OpenSession, OwnAccount, SignInCode
 from iveg.models.base import Costmap, Coverage, Model, Scan
-from iveg.models.command import FleetPressed, Latency
+from iveg.models.command import FleetPressed
 from iveg.models.health import LatencyTable
 from iveg.models.history import AuditEntry, Decision, Reading
 from iveg.models.people import Thing
@@ -32,7 +32,6 @@ TOLD: tuple[type[Model], ...] = (
     Costmap,
     Coverage,
     Decision,
-    Latency,
     LatencyTable,
     FleetPressed,
     AuditEntry,

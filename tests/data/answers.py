@@ -64,7 +64,6 @@ _ROUTES = (
     "detections",
     "commands",
     "commands/C1",
-    "commands/latency?since=2023-11-14T22:00:00Z&until=2023-11-14T23:00:00Z",
     "alerts",
     "log",
     "latency?window=1min&figures=false",

@@ -497,13 +497,6 @@ export type LaneCoverage = {
   ages_s: (number | null)[];
 };
 
-/** Times of the newest STOPs of a range. */
-export type Latency = {
-  since: string;
-  until: string;
-  robots: RobotLatency[];
-};
-
 /** A robot's clock less the server's, as far as it is proven. */
 export type LatencyClock = {
   robot_id: string;
@@ -516,14 +509,6 @@ export type LatencyClock = {
 export type LatencyRow = {
   data: "odometry" | "detections" | "lidar";
   hops: Record<string, SegmentSpread>;
-};
-
-/** Times of one step (ms); null where nothing was measured. */
-export type LatencySpread = {
-  count: number;
-  p50_ms: number | null;
-  p95_ms: number | null;
-  max_ms: number | null;
 };
 
 /** Every hop of every kind of data over one window. */
@@ -814,17 +799,6 @@ export type Robot = {
   /** The agent's opinion, never believed. */
   cmd_status: string | null;
   battery: Battery | null;
-};
-
-/** One robot's STOPs: how many, and each step from the press on. */
-export type RobotLatency = {
-  robot_id: string;
-  stops: number;
-  accepted: LatencySpread;
-  /** By transport, until it left; ``answer`` until the robot said that it has it. */
-  sent: Record<string, LatencySpread>;
-  answer: Record<string, LatencySpread>;
-  standing: LatencySpread;
 };
 
 /** One version of the detection rule. */

@@ -1,8 +1,7 @@
 """Summaries of the history over HTTP: figures, latency of STOP, the evening sheet."""
 
 import asyncio
-from collections import defaultdict
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import closing
 from datetime import date, timedelta
 from typing import Annotated, Any
@@ -23,7 +22,6 @@ from iveg.adapters.history.series import (
     AIR,
     EQUIPMENT,
     SPEEDS,
-    CommandLatency,
     command_latencies,
     confidence_counts,
     people_seen,
@@ -43,11 +41,9 @@ from iveg.domain.errors import HopError
 from iveg.domain.fleet import FleetDescription, as_counted
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
-from iveg.domain.records import ByTransport
 from iveg.domain.stamps import format_stamp
-from iveg.domain.transports import TRANSPORTS, TransportId
 from iveg.models.base import GreenhouseMap, Point, write_json
-from iveg.models.command import Command, Latency, LatencySpread, RobotLatency
+from iveg.models.command import Command
 from iveg.models.history import Day, Encounters, Pass, Slowed, Worked
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Apart, Json
@@ -156,18 +152,6 @@ def stop_records_router(
         responses=refusals(503),
     )
 
-    @routes.get("/commands/latency", response_model=Latency)
-    async def latency(asked: Annotated[Range, Query()]) -> Response:
-        """P50, P95 and longest of each step, per robot; 15 minutes unless told."""
-        since, until = range_of(asked, clock().wall)
-        found = await queries.ask(command_latencies, since, until, asked.robot)
-        body = Latency(
-            since=format_stamp(since),
-            until=format_stamp(until),
-            robots=_by_robot(found),
-        )
-        return Json(body)
-
     @routes.get("/commands/{command_id}", response_model=Command)
     async def command(
         command_id: Annotated[str, Path(pattern=r"^[ -~]{1,64}$")],
@@ -200,35 +184,6 @@ def _joined(followed: Command | None, kept: Command | None) -> Command | None:
         return followed or kept
     ended = {"outcome": kept.outcome, "was_loud": kept.was_loud, "steps": kept.steps}
     return followed.model_copy(update=ended)
-
-
-def _by_robot(found: Iterable[CommandLatency]) -> list[RobotLatency]:
-    by_robot: dict[str, list[CommandLatency]] = defaultdict(list)
-    for one in found:
-        by_robot[one.robot_id].append(one)
-    robots = sorted(by_robot, key=as_counted)
-    return [_robot(robot_id, by_robot[robot_id]) for robot_id in robots]
-
-
-def _robot(robot_id: str, stops: list[CommandLatency]) -> RobotLatency:
-    return RobotLatency(
-        robot_id=robot_id,
-        stops=len(stops),
-        accepted=LatencySpread.of(one.accepted_ms for one in stops),
-        sent=_by_transport([one.sent_ms for one in stops]),
-        answer=_by_transport([one.answer_ms for one in stops]),
-        standing=LatencySpread.of(one.standstill_ms for one in stops),
-    )
-
-
-def _by_transport(took: list[ByTransport]) -> dict[TransportId, LatencySpread]:
-    """Spread for each transport of the table, and for those that rows know besides."""
-    known = dict.fromkeys(one.id for one in TRANSPORTS)
-    known |= dict.fromkeys(transport for one in took for transport in one)
-    return {
-        transport: LatencySpread.of(one.get(transport) for one in took)
-        for transport in known
-    }
 
 
 _DAY = timedelta(days=1)

@@ -59,25 +59,6 @@ async def asking(tmp_path: Path) -> AsyncIterator[httpx.AsyncClient]:
     queries.close()
 
 
-async def test_each_step_is_summarised_for_each_robot(
-    asking: httpx.AsyncClient,
-) -> None:
-    answer = (await asking.get("/api/v1/commands/latency")).json()
-
-    agi, agii = answer["robots"]
-    assert (agi["robot_id"], agi["stops"]) == ("AGI", 6)
-    assert agi["accepted"]["max_ms"] == pytest.approx(70.0, abs=0.2)
-    assert agi["answer"]["direct"]["p50_ms"] == pytest.approx(50.0, abs=0.2)
-    assert agi["standing"] == {
-        "count": 5,
-        "p50_ms": 3000.0,
-        "p95_ms": 6000.0,
-        "max_ms": 6000.0,
-    }
-    assert agii["accepted"]["count"] == agii["standing"]["count"] == 0
-    assert agii["standing"]["p50_ms"] is None
-
-
 async def test_a_command_of_an_earlier_run_is_found_in_the_history(
     asking: httpx.AsyncClient,
 ) -> None:
