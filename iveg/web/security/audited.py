@@ -76,7 +76,6 @@ _ROWS: Final[Mapping[str, str]] = {
     "POST /api/v1/users/{user_id}/reset": "account_reset",
     "POST /api/v1/users/{user_id}/disable": "account_disabled",
     "PUT /api/v1/account/password": "password_changed",
-    "PUT /api/v1/account/language": "language language",
     "POST /api/v1/tokens": "token_added name scope days",
     "DELETE /api/v1/tokens/{token_id}": "token_revoked",
     "DELETE /api/v1/sessions/{session_id}": "session_ended > name",
