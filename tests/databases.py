@@ -34,7 +34,7 @@ def _newest() -> bytes:
 
 def put_into_tables(url: str, person: Account, program: ApiToken) -> None:
     """Whom the version before has kept in the database."""
-    named = {"name_key": name_key(person.name)}
+    named = {"name_key": name_key(person.name), "language": "es"}
     people = insert(accounts).values(**asdict(person) | named)
     named = {"name_key": name_key(program.name)}
     programs = insert(api_tokens).values(**asdict(program) | named)

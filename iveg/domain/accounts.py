@@ -22,7 +22,6 @@ SignInMethod = Literal["link", "password", "sso", "token"]
 OF_ACCOUNTS: Final = frozenset({"password", "sso"})
 """Methods of people with an account, which decides over their sessions."""
 PersonRole = Literal["viewer", "operator", "admin"]
-Language = Literal["es", "en"]
 AccountState = Literal["active", "invited", "lapsed", "over", "disabled"]
 """``lapsed``: the invitation was not taken in time; ``over``: ended by itself."""
 TokenScope = Literal["read", "stop", "operate"]
@@ -76,7 +75,6 @@ class Account:
         invited_until: When the invitation is over (Unix s).
         since: Sessions that began before are over (Unix s): a new role or password.
         provider: Issuer that vouches for the person and gives the role; empty: none.
-        language: What the person reads; empty: whatever their browser asks for.
     """
 
     account_id: str
@@ -89,7 +87,6 @@ class Account:
     invited_until: float = 0.0
     since: float = 0.0
     provider: str = ""
-    language: Language | Literal[""] = ""
 
     def is_open(self, now: float) -> bool:
         """Whether the person may be here at this moment (Unix s)."""

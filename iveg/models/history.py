@@ -115,8 +115,8 @@ class AuditEntry(Row):
 
     details: dict[str, JsonValue] = Field(
         description=(
-            "``status`` of the answer, and what was asked; of a rule ``version_seen`` "
-            "and the new ``version``."
+            "``status`` of the answer, and what was asked; of a rule the new "
+            "``version``."
         )
     )
 

@@ -209,7 +209,7 @@ def mark_moved(url: str, now: float) -> None:
 def _read(connection: Connection) -> Access | None:
     if connection.execute(select(access_moved)).first() is not None:
         return None
-    known = [one for one in accounts.c if one.key != "name_key"]
+    known = [one for one in accounts.c if one.key not in ("name_key", "language")]
     people = connection.execute(select(*known)).mappings()
     known = [one for one in api_tokens.c if one.key != "name_key"]
     programs = connection.execute(select(*known)).mappings()

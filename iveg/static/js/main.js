@@ -5,7 +5,6 @@
  * STOP controls along.
  */
 
-import { sendApi } from "./core/api.js";
 import { loadI18n, switchLanguage } from "./core/i18n.js";
 import { askedMoment } from "./core/moments.js";
 import { createPainting } from "./core/painting.js";
@@ -55,9 +54,6 @@ function wireLanguage() {
     button.addEventListener("click", () => {
       const language = /** @type {"es" | "en"} */ (button.dataset.language);
       switchLanguage(language);
-      // Other browsers learn of it when their person signs in.
-      if ("account" in document.body.dataset)
-        sendApi("PUT", "account/language", { language });
       for (const other of buttons) {
         const isIts = other.dataset.language === button.dataset.language;
         setAttribute(other, "aria-pressed", String(isIts));

@@ -58,7 +58,7 @@ export type Area = {
 
 /** One row of the audit. */
 export type AuditEntry = {
-  /** ``status`` of the answer, and what was asked; of a rule ``version_seen`` and the new ``version``. */
+  /** ``status`` of the answer, and what was asked; of a rule the new ``version``. */
   details: Record<string, JsonValue>;
   /** The row; one offered twice is stored once. */
   audit_id: string;

@@ -18,7 +18,6 @@ from iveg.adapters.passwords import LEAST, MOST
 from iveg.domain.accounts import (
     MOST_NAME,
     Account,
-    Language,
     PersonRole,
     Session,
     TokenScope,
@@ -42,7 +41,6 @@ from iveg.models.access import (
 )
 from iveg.models.base import Body, Listing, stamp
 from iveg.web.api.answers import Json
-from iveg.web.cookies import keep_language
 from iveg.web.problems import Problem
 from iveg.web.security.people import People
 from iveg.web.security.requirements import (
@@ -138,12 +136,6 @@ class PasswordBody(Body):
     new: str = Field(min_length=LEAST, max_length=MOST)
 
 
-class LanguageBody(Body):
-    """The language that is to be."""
-
-    language: Language
-
-
 def router(people: People) -> APIRouter:
     """The routes of whoever asks, about themselves."""
     routes = APIRouter(
@@ -175,17 +167,6 @@ def router(people: People) -> APIRouter:
             if error.status_code != 401:
                 raise
         return Problem(403, "The old password is wrong.", "wrong-password").response()
-
-    @routes.put("/language", status_code=204)
-    async def choose(body: LanguageBody, who: Reader) -> Response:
-        """Keep a language for every browser in which the person signs in."""
-        refuse_walls(who)
-        if not who.has_account:
-            raise HTTPException(409, "A link has no account; its browsers choose.")
-        people.choose_language(who.person, body.language)
-        response = Response(status_code=204)
-        keep_language(response, body.language)
-        return response
 
     return routes
 

@@ -28,73 +28,78 @@ class Audited:
 
     Attributes:
         action: Its word in the audit; empty: the route writes its rows itself.
-        asked: Keys of the body that are kept; ``answered`` of the answer.
-        by_store: A change and its row are one transaction of the store; here only what
-            was refused is written.
+        asked: Members of the body that are kept; ``answered`` of the answer.
     """
 
     action: str
-    asked: tuple[str, ...] = ()
-    answered: tuple[str, ...] = ()
-    by_store: bool = False
+    asked: tuple[str, ...]
+    answered: tuple[str, ...]
+
+    @property
+    def is_noted(self) -> bool:
+        """Whether a change leaves its row elsewhere; here only refusals do."""
+        return self.action in _NOTED_BY_BOOK
 
 
-def _row(
-    route: str,
-    action: str,
-    asked: str = "",
-    answered: str = "",
-    *,
-    by_store: bool = False,
-) -> tuple[tuple[str, str], Audited]:
-    method, path = route.split()
-    names, told = tuple(asked.split()), tuple(answered.split())
-    return (method, path), Audited(action, names, told, by_store)
-
-
-_PRESS: Final = "press_id pressed_at"
-_RULE: Final = " ".join((*by_keys(Parameters()), "aliases"))
-_ROWS: Final = (
-    _row("POST /api/v1/robots/{robot_id}/stop", "stop", _PRESS, "command_id"),
-    _row("POST /api/v1/fleet/stop", "stop", _PRESS, "commands"),
-    _row("POST /api/v1/robots/{robot_id}/release", "release", "holds", "command_id"),
-    _row("POST /api/v1/robots/{robot_id}/resume", "resume", "", "command_id"),
-    _row("POST /api/v1/robots/{robot_id}/goal", "goal", "kind x y aisle", "goal_id"),
-    _row("DELETE /api/v1/robots/{robot_id}/goal", "cancel_goal", "", "goal_id"),
-    _row("PUT /api/v1/robots/{robot_id}/detector", "detector", "in_service reason"),
-    _row("PUT /api/v1/words", "word", "detector word is_person"),
-    _row(
-        "POST /api/v1/alerts/{alert_id}/acknowledge",
-        "acknowledge",
-        "note",
-        "key robot_id",
-    ),
-    _row("POST /api/v1/alerts/acknowledge", "acknowledge", "alert_ids note", "left"),
-    _row("PUT /api/v1/rule", "rule", f"version {_RULE}", "version"),
-    _row("POST /api/v1/rule/trial", "trial", _RULE),
-    _row("DELETE /api/v1/rule/trial", "trial_ended"),
-    _row("POST /api/v1/rule/trial/promote", "trial_promoted", "version", "version"),
-    _row("POST /api/v1/notes", "note", "text at x y robot_id decision_id"),
-    _row("POST /api/v1/things", "mark_thing", "person_id", "id"),
-    _row("DELETE /api/v1/things/{thing_id}", "unmark_thing"),
-    _row("POST /api/v1/users", "account_added", "name role days", by_store=True),
-    _row("PUT /api/v1/users/{user_id}/role", "account_role", "role", by_store=True),
-    _row("POST /api/v1/users/{user_id}/reset", "account_reset", by_store=True),
-    _row("POST /api/v1/users/{user_id}/disable", "account_disabled", by_store=True),
-    _row("PUT /api/v1/account/password", "password_changed", by_store=True),
-    _row("PUT /api/v1/account/language", "language", "language"),
-    _row("POST /api/v1/tokens", "token_added", "name scope days", by_store=True),
-    _row("DELETE /api/v1/tokens/{token_id}", "token_revoked", by_store=True),
-    _row("DELETE /api/v1/sessions/{session_id}", "session_ended", "", "name"),
-    _row("DELETE /api/v1/account/sessions/{session_id}", "session_ended", "", "name"),
-    _row("DELETE /api/v1/sessions", "sessions_ended", "", "ended"),
-    _row("DELETE /api/v1/account/sessions", "sessions_ended", "", "ended"),
-    _row("POST /signin", ""),
-    _row("POST /signout", "sign_out"),
-    _row("POST /wall", "wall"),
+_NOTED_BY_BOOK: Final = frozenset(
+    {
+        "account_added",
+        "account_disabled",
+        "account_reset",
+        "account_role",
+        "password_changed",
+        "token_added",
+        "token_revoked",
+    }
 )
-AUDITED: Final[Mapping[tuple[str, str], Audited]] = dict(_ROWS)
-"""Method and path of a route → what is kept."""
+_RULE: Final = " ".join((*by_keys(Parameters()), "aliases"))
+_ROWS: Final[Mapping[str, str]] = {
+    "POST /api/v1/robots/{robot_id}/stop": "stop press_id pressed_at > command_id",
+    "POST /api/v1/fleet/stop": "stop press_id pressed_at > commands",
+    "POST /api/v1/robots/{robot_id}/release": "release holds > command_id",
+    "POST /api/v1/robots/{robot_id}/resume": "resume > command_id",
+    "POST /api/v1/robots/{robot_id}/goal": "goal kind x y aisle > goal_id",
+    "DELETE /api/v1/robots/{robot_id}/goal": "cancel_goal > goal_id",
+    "PUT /api/v1/robots/{robot_id}/detector": "detector in_service reason",
+    "PUT /api/v1/words": "word detector word is_person",
+    "POST /api/v1/alerts/{alert_id}/acknowledge": "acknowledge note > key robot_id",
+    "POST /api/v1/alerts/acknowledge": "acknowledge alert_ids note > left",
+    "PUT /api/v1/rule": f"rule version {_RULE} > version",
+    "POST /api/v1/rule/trial": f"trial {_RULE}",
+    "DELETE /api/v1/rule/trial": "trial_ended",
+    "POST /api/v1/rule/trial/promote": "trial_promoted version > version",
+    "POST /api/v1/notes": "note text at x y robot_id decision_id",
+    "POST /api/v1/things": "mark_thing person_id > id",
+    "DELETE /api/v1/things/{thing_id}": "unmark_thing",
+    "POST /api/v1/users": "account_added name role days",
+    "PUT /api/v1/users/{user_id}/role": "account_role role",
+    "POST /api/v1/users/{user_id}/reset": "account_reset",
+    "POST /api/v1/users/{user_id}/disable": "account_disabled",
+    "PUT /api/v1/account/password": "password_changed",
+    "POST /api/v1/tokens": "token_added name scope days",
+    "DELETE /api/v1/tokens/{token_id}": "token_revoked",
+    "DELETE /api/v1/sessions/{session_id}": "session_ended > name",
+    "DELETE /api/v1/account/sessions/{session_id}": "session_ended > name",
+    "DELETE /api/v1/sessions": "sessions_ended > ended",
+    "DELETE /api/v1/account/sessions": "sessions_ended > ended",
+    "POST /signin": "",
+    "POST /signout": "sign_out",
+    "POST /wall": "wall",
+}
+"""Method and path of a route → action, keys of the body > keys of the answer."""
+
+
+def _read_row(row: str) -> Audited:
+    before, _, after = row.partition(">")
+    action, *asked = before.split() or [""]
+    return Audited(action, tuple(asked), tuple(after.split()))
+
+
+AUDITED: Final = {
+    (method, path): _read_row(row)
+    for route, row in _ROWS.items()
+    for method, path in [route.split()]
+}
 
 _MOST_BYTES: Final = 16 * 1024
 """Largest body that is read; a longer one leaves its row without it."""
@@ -133,7 +138,7 @@ class AuditRequests:
             await self._app(scope, receive, send)
             return
         reads = scope["method"] in READING
-        # Before it is served: who signs out is nobody afterwards.
+        # Before it is served: a person who signs out is nobody afterwards.
         who = None if reads else self._identify(HTTPConnection(scope))
         asked, answered = bytearray(), bytearray()
         start: Message = {"status": 500, "headers": ()}
@@ -179,12 +184,10 @@ class AuditRequests:
     ) -> None:
         path: str = getattr(scope.get("route"), "path", "")
         kept = AUDITED.get((scope["method"], path))
-        if kept is None or not kept.action or (kept.by_store and status < 400):
+        if kept is None or not kept.action or (kept.is_noted and status < 400):
             return
         asked, answered = _named(body, kept.asked), _named(answer, kept.answered)
-        # What was seen stays beside what came of it.
-        seen = {f"{name}_seen": asked[name] for name in asked.keys() & answered.keys()}
-        details = {"status": status, **asked, **answered, **seen}
+        details = {"status": status, **asked, **answered}
         subject = clean_text("".join(map(str, scope["path_params"].values())))
         self._trail.note(who, kept.action, subject, details, at=self._clock())
 

@@ -25,7 +25,7 @@ from starlette.websockets import WebSocket
 from iveg.domain.accounts import DEFAULT_NAME, Account
 from iveg.domain.errors import NotAllowedError
 from iveg.vital.audit import AuditTrail
-from iveg.web.cookies import keep_language, session_cookie
+from iveg.web.cookies import session_cookie
 from iveg.web.problems import (
     ForeignOriginError,
     NotJsonError,
@@ -144,9 +144,7 @@ class Authenticator:
         cookie = self.sessions.open(
             account.name, account.role, account.account_id, "password"
         )
-        response = Response(status_code=204)
-        keep_language(response, account.language)
-        return self.admit(request, cookie, response)
+        return self.admit(request, cookie, Response(status_code=204))
 
     def admit(self, request: Request, cookie: str, response: Response) -> Response:
         """Give a browser its session; the audit has it."""

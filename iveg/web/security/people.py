@@ -10,7 +10,6 @@ from iveg.domain.accounts import (
     AccessBook,
     Account,
     ApiToken,
-    Language,
     TokenScope,
     digest_of,
     name_key,
@@ -116,12 +115,6 @@ class People:
         if account is None or account.password != was or account.disabled:
             return None
         return self.admission(who).give_password(account, kept)
-
-    def choose_language(self, person: str, language: Language) -> None:
-        """Keep what somebody reads."""
-        account = self.find(person)
-        if account is not None:
-            self.book.put(replace(account, language=language))
 
     def program(self, token: str) -> Principal | None:
         """The program whose token this is; None: nobody's, or nobody's any more."""

@@ -103,18 +103,3 @@ async def test_a_reset_meanwhile_is_not_undone_by_the_old_password(
 
     assert refused.status_code == 403
     assert desk.book.accounts["P1"] == reset
-
-
-async def test_a_language_is_kept_with_the_account_and_given_to_the_next_browser(
-    desk: OwnDesk,
-) -> None:
-    english = {"language": "en"}
-    async with desk.ana() as here:
-        before = here.cookies.get("iveg_language")
-        chosen = await here.put("/api/v1/account/language", json=english)
-    async with desk.ana() as there:
-        page = await there.get("/account")
-
-    assert (before, chosen.status_code) == (None, 204)
-    assert there.cookies["iveg_language"] == "en"
-    assert '<html lang="en"' in page.text
