@@ -24,7 +24,6 @@ from iveg.domain.observations import (
     EntityReading,
     GoalAnswer,
     Instant,
-    Observation,
     Received,
     SafetyReport,
 )
@@ -44,8 +43,8 @@ class Listeners(TypedDict, total=False):
 
     measured: Callable[[str, bytes, Instant], object]
     """A robot's own message was read: topic, payload, and when."""
-    notified: Callable[[bytes, Instant, Sequence[Observation]], object]
-    """A notification was read, and what was observed in it."""
+    notified: Callable[[bytes, Instant], object]
+    """A notification was read."""
     entity_read: Callable[[EntityReading, Instant], object]
     """Orion said something of other equipment."""
     arrived: Callable[[Received], object]

@@ -5,7 +5,7 @@ its own limit and secret.  Refusals look like those of the rest of the applicati
 """
 
 import asyncio
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Final, Protocol
@@ -15,7 +15,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.observations import EntityReading, Instant, Observation, Received
+from iveg.domain.observations import EntityReading, Instant, Received
 from iveg.domain.transports import FIWARE
 from iveg.ngsi.codec import read_notification
 from iveg.vital.ingest import Ingest
@@ -50,13 +50,13 @@ class Followers:
         notified: Each notification of Orion's came then.
         equipment: Id and type of the entities that ``measured`` is told of.
         measured: A reading of other equipment.
-        recorded: Each body that is read, and what is observed in it.
+        recorded: Each body that is read.
     """
 
     notified: Callable[[Instant], None]
     equipment: Container[tuple[str, str]]
     measured: Callable[[EntityReading, Instant], None]
-    recorded: Callable[[bytes, Instant, Sequence[Observation]], None]
+    recorded: Callable[[bytes, Instant], None]
 
 
 class NotificationEndpoint:
@@ -151,7 +151,7 @@ class NotificationEndpoint:
             self._ingest.reject(subscription_id, "unknown_subscription")
             return None
         followers.notified(at)
-        followers.recorded(body, at, reading.observations)
+        followers.recorded(body, at)
         for problem in reading.problems:
             self._ingest.reject(problem.source, problem.reason, problem.detail)
         for entity in reading.equipment:
