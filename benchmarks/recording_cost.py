@@ -1,4 +1,4 @@
-"""What recording costs: CPU of the server and of the process that writes, and room.
+"""Cost of recording: CPU of the server, age of what its pages are sent, and room.
 
     python -m benchmarks.recording_cost --robots 10 --seconds 20 --rounds 3
 
@@ -31,11 +31,9 @@ from benchmarks.glass import (
 )
 from benchmarks.process import machine, percentile, print_table
 from benchmarks.readers import Reader, look
-from tests.processes import children_of
 
 HZ = 30.0
-WRITER = "iveg.adapters.recordings.writer"
-HEAD = ("recordings", "P95 ms", "server", "writer", "MB/robot-h")
+HEAD = ("recordings", "P95 ms", "server", "MB/robot-h")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +47,6 @@ class Run:
 
     p95_ms: float
     server: float
-    writer: float
     robot_hour_mb: float
 
 
@@ -92,20 +89,17 @@ async def _look(place: Place, robots: int, seconds: float, folder: Path) -> Run:
     await asyncio.sleep(WARM_UP_S)
     (page,) = pages
     (server,) = (one for one in place.servers if "serve" in words_of(one))
-    writers = [one for one in children_of(server) if WRITER in words_of(one)]
-    before = spent([server]), spent(writers), _size(folder)
+    before = spent([server]), _size(folder)
     page.ages_s.clear()
     await asyncio.sleep(seconds)
     ages = sorted(page.ages_s)
-    after = spent([server]), spent(writers), _size(folder)
+    after = spent([server]), _size(folder)
     looking.cancel()
     await asyncio.gather(looking, return_exceptions=True)
-    cpu_s, writer_s, size = (
-        now - then for now, then in zip(after, before, strict=True)
-    )
+    cpu_s, size = (now - then for now, then in zip(after, before, strict=True))
     hours = robots * seconds / 3600.0
     p95_ms = 1000.0 * percentile(ages, 0.95)
-    return Run(p95_ms, cpu_s / seconds, writer_s / seconds, size / hours / 1e6)
+    return Run(p95_ms, cpu_s / seconds, size / hours / 1e6)
 
 
 def _size(folder: Path) -> int:

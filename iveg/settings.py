@@ -425,9 +425,14 @@ class Settings:
         """Value of the provider's claim → the role that it gives."""
         return dict(row for one in self.sso_roles if (row := split_role(one)))
 
-    def limits_of_recordings(self, most_gb: int) -> RecordingLimits:
-        """Limits of one sort of recordings."""
-        return RecordingLimits(self.keep_recordings_days, most_gb * 10**9)
+    @property
+    def limits_of_recordings(self) -> tuple[RecordingLimits, RecordingLimits]:
+        """Limits of what came in, and of pictures."""
+        days = self.keep_recordings_days
+        return (
+            RecordingLimits(days, self.keep_recordings_gb * 10**9),
+            RecordingLimits(days, self.keep_pictures_gb * 10**9),
+        )
 
     @property
     def retention(self) -> Retention:

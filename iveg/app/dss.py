@@ -31,7 +31,6 @@ from iveg.adapters.messages import AppriseSender, load_messages
 from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.recordings.pictures import PictureFiles
 from iveg.adapters.recordings.recorder import PART as RECORDINGS
-from iveg.adapters.recordings.recorder import RecordedSink
 from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.adapters.worker import PACK_LIMIT_S, Worker
 from iveg.app.accounts import PART as ACCOUNTS
@@ -123,11 +122,15 @@ class Dss:
             ),
         )
         self.core = core = self.pipeline.core
-        inputs, self.supervision = self.stores.inputs, core.supervision
-        inputs.rule = lambda: self.pipeline.evaluator.rule
-        self.supervision.listen(
-            RECORDINGS, measured=inputs.measure, notified=inputs.notification
-        )
+        self.supervision = core.supervision
+        if settings.recordings:
+            inputs = self.stores.inputs
+            self.supervision.listen(
+                RECORDINGS,
+                measured=inputs.measure,
+                notified=inputs.notification,
+                arrived=inputs.draw,
+            )
         plan = load_messages(settings.messages)
         write, alerts = sentences.writer(plan.language), self.pipeline.evaluator.alerts
         self.messenger = Messenger(plan, AppriseSender().send, write, alerts, core)
@@ -161,7 +164,7 @@ class Dss:
             mqtt,
             {direct: mqtt, FIWARE: OrionTransport(self.outside.orion)},
             self.stores.journal,
-            RecordedSink(self.stores.recorder, self.stores.inputs.row),
+            self.stores.recorder,
             clock.now,
             new_id,
             self.stores.history_state,
@@ -378,7 +381,7 @@ def open_dss(
     fleet = load_fleet(settings.fleet, settings.robots)
     if unknown := sorted({*settings.refused_robots} - {*fleet.ids}):
         raise SettingsError("IVEG_REFUSED_ROBOTS", unknown[0], "robots of the fleet")
-    outside = open_outside(settings, data_directory, fleet)
+    outside = open_outside(settings, data_directory)
     return make(settings, fleet, outside, demo=demo)
 
 

@@ -25,11 +25,9 @@ from iveg.adapters.mqtt import BrokerAddress, MqttLink, TlsFiles
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.reconciler import FiwareSite
 from iveg.adapters.recordings.recorder import InputRecorder
-from iveg.adapters.recordings.writer import WriterSetup
 from iveg.adapters.rules import FileRules, FileTrials
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import OutOfService
-from iveg.domain.fleet import FleetDescription
 from iveg.domain.words import WordAnswer
 from iveg.settings import Settings
 from iveg.vital.health_monitor import HopState
@@ -116,9 +114,7 @@ class Outside:
             await self.provider.close()
 
 
-def open_outside(
-    settings: Settings, data_directory: Path, fleet: FleetDescription
-) -> Outside:
+def open_outside(settings: Settings, data_directory: Path) -> Outside:
     """Open the ports that the settings name; nothing is connected yet."""
     orion, agent = open_fiware(settings)
     broker = BrokerAddress.from_url(
@@ -128,7 +124,7 @@ def open_outside(
         TlsFiles(settings.mqtt_ca, settings.mqtt_cert, settings.mqtt_key),
     )
     return Outside(
-        open_stores(settings, data_directory, fleet),
+        open_stores(settings, data_directory),
         MqttLink(broker, "iveg"),
         orion,
         agent,
@@ -142,9 +138,7 @@ def files_of(url: str, data_directory: Path) -> Path:
     return data_directory if database is None else database.parent
 
 
-def open_stores(
-    settings: Settings, data_directory: Path, fleet: FleetDescription
-) -> Stores:
+def open_stores(settings: Settings, data_directory: Path) -> Stores:
     """Open the stores; a missing directory is created."""
     url = history_url(settings.database_url, data_directory)
     directory = files_of(url, data_directory)
@@ -163,15 +157,7 @@ def open_stores(
         FileTrials(directory / "trial.jsonl"),
         AccessFile(directory / ACCOUNTS),
         InputRecorder(
-            WriterSetup(
-                (directory / "recordings").resolve(),
-                limits=settings.limits_of_recordings(settings.keep_recordings_gb),
-                pictures=settings.limits_of_recordings(settings.keep_pictures_gb),
-                apikey=settings.apikey,
-                robots=fleet.ids,
-            ),
-            clock.now,
-            is_on=settings.recordings,
+            directory / "recordings", clock.now, settings.limits_of_recordings
         ),
     )
 

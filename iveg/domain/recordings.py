@@ -1,4 +1,4 @@
-"""Recordings of what came in: one file an hour, and which of them go."""
+"""Recordings as files, and which of them go."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -43,15 +43,14 @@ class RecordingLimits:
 def superfluous(
     files: Iterable[RecordingFile], limits: RecordingLimits
 ) -> Sequence[RecordingFile]:
-    """Files that are over the limits, oldest first; never the one that is written."""
-    kept = sorted(files, key=lambda one: one.name)
-    days = sorted({one.day for one in kept})
-    outdated = set(days[: -limits.days]) if limits.days else set()
-    left = sum(one.size for one in kept)
+    """Files that are over the limits; never the one that is written."""
+    days, size = set[str](), 0
     gone = []
-    for one in kept:
-        is_over = one.day in outdated or 0 < limits.most_bytes < left
-        if is_over and not one.is_open:
-            gone.append(one)
-            left -= one.size
+    for file in sorted(files, key=lambda one: one.name, reverse=True):
+        days.add(file.day)
+        size += file.size
+        is_outdated = 0 < limits.days < len(days)
+        is_over = is_outdated or 0 < limits.most_bytes < size
+        if is_over and not file.is_open:
+            gone.append(file)
     return gone

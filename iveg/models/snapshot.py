@@ -201,10 +201,6 @@ class PastWorld(World):
         description="The moment that is shown: the newest by the one asked."
     )
     at_s: float = Field(description="The same (Unix s).")
-    recorded_twice: bool = Field(
-        description="Whether another recording has this moment, too: the server's clock"
-        " was set back."
-    )
     left_out: list[str] = Field(
         description="Topics of the recording that this version does not know."
     )

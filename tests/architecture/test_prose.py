@@ -19,7 +19,7 @@ _TO_DO = """
     lab/experiment/stage lab/experiment/tables ngsi/codec/attributes
     ngsi/codec/feedback setting_types settings vital/__init__ vital/evaluate
     vital/event_log vital/log_messages vital/supervision web/api/account
-    web/api/goals web/build web/live/pictures web/pages/signing web/refusals
+    web/api/goals web/build web/pages/signing web/refusals
     web/security/attempts web/security/audited web/security/authentication
     web/security/people web/security/rate_limits web/security/requirements
     web/security/sessions

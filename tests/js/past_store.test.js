@@ -7,7 +7,6 @@ const world = (at_s, x) =>
   /** @type {any} */ ({
     at_s,
     left_out: [],
-    recorded_twice: false,
     robots: [
       {
         robot_id: "AGI",
@@ -49,6 +48,4 @@ test("what stands still grows no older, and says where it may differ", () => {
   equal(past.leftOut, []);
   past.take({ ...world(101, 1), left_out: ["moods"] });
   equal(past.leftOut, ["moods"]);
-  past.take({ ...world(102, 1), recorded_twice: true });
-  equal(past.isTwice, true);
 });

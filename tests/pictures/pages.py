@@ -24,7 +24,6 @@ def _then(told: Frozen) -> Callable[[Route], None]:
         "at": PAST_AT,
         "at_s": NOW - 80.2,
         "left_out": [],
-        "recorded_twice": False,
         "scans": [],
     }
     return lambda route: route.fulfill(

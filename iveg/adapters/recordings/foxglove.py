@@ -1,48 +1,64 @@
-"""Messages for viewers such as Foxglove, made of those that came in, thinned.
+"""Messages for viewers such as Foxglove, made of observations, thinned.
 
 ``foxglove.json`` has the schemas (https://docs.foxglove.dev/docs/sdk/schemas).  Frames
 are ``map`` and ``{robot}/base_link``.
 """
 
-import contextlib
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from importlib.resources import files
-from typing import Any
+from typing import Any, Final
 
+import numpy as np
 import orjson
 
-from iveg.adapters.direct import DirectReader
-from iveg.adapters.recordings.incoming import Incoming, Sort
 from iveg.adapters.recordings.mcap_file import Channel
-from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import (
     Detection,
     DetectionFrame,
-    Instant,
     LaserScan,
     Observation,
     Odometry,
     Received,
     kind_of,
 )
-from iveg.ngsi.codec import read_notification
 
-Told = tuple[Channel, Mapping[str, Any]]
-"""A message and its channel."""
-_SCHEMAS = orjson.loads((files(__package__) / "foxglove.json").read_bytes())
+_SCHEMAS: Final = orjson.loads((files(__package__) / "foxglove.json").read_bytes())
 _MAP, _BASE = "map", "base_link"
-_SHOWN_S = 1.0
-"""How long a box is drawn; the next picture takes its place before that."""
+_SHOWN_S: Final = 1.0
+"""Time that a box is drawn; the next picture takes its place before that."""
+DRAWN_APART_S: Final[Mapping[type[Observation], float]] = {
+    Odometry: 0.1,
+    LaserScan: 0.2,
+    DetectionFrame: 0.2,
+}
+"""Kinds that viewers draw, and the least time between two of a robot (s)."""
+_EARLY: Final = 0.95
 
 
-def _channel(topic: str, schema: str) -> Channel:
-    return Channel(topic, f"foxglove.{schema}", _SCHEMAS[f"foxglove.{schema}"])
+class Drawing:
+    """Draws observations as they come, of either transport."""
+
+    def __init__(self) -> None:
+        self._due: dict[tuple[str, type[Observation]], float] = {}
+
+    def messages(self, received: Received) -> Iterator[tuple[Channel, bytes]]:
+        """Messages of an observation that is due."""
+        observation, now = received.observation, received.at
+        stream = observation.robot_id, kind_of(observation)
+        apart_s = DRAWN_APART_S.get(stream[1])
+        if apart_s is None or now.mono < self._due.get(stream, now.mono):
+            return
+        for channel, value in _drawn(observation, now.wall):
+            self._due[stream] = now.mono + apart_s * _EARLY
+            yield channel, orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
-def messages_of(observation: Observation, wall: float) -> Iterator[Told]:
-    """Messages for viewers, of an observation that came at ``wall`` (Unix s)."""
+def _drawn(
+    observation: Observation, wall: float
+) -> Iterator[tuple[Channel, Mapping[str, Any]]]:
+    """Messages of an observation that came at ``wall`` (Unix s)."""
     at, robot_id = _time(wall), observation.robot_id
     base = f"{robot_id}/{_BASE}"
     match observation:
@@ -62,27 +78,29 @@ def messages_of(observation: Observation, wall: float) -> Iterator[Told]:
                     "rotation": placed["orientation"],
                 },
             )
-        case LaserScan():
-            message = {"timestamp": at, "frame_id": base, **_scan(observation)}
+        case LaserScan(angle_min=first, angle_increment=step, ranges=ranges):
+            message = {
+                "timestamp": at,
+                "frame_id": base,
+                "pose": _as_pose(observation.mount),
+                "start_angle": first,
+                "end_angle": first + step * max(0, ranges.size - 1),
+                "ranges": np.round(ranges, 3),
+                "intensities": [],
+            }
             yield _channel(f"/{robot_id}/scan", "LaserScan"), message
-        case DetectionFrame():
+        case DetectionFrame(detections=detections):
             entities = [
                 {"timestamp": at, "id": f"{robot_id}-{number}", **_entity(one, base)}
-                for number, one in enumerate(observation.detections)
+                for number, one in enumerate(detections)
             ]
             message = {"deletions": [], "entities": entities}
             yield _channel(f"/{robot_id}/detections", "SceneUpdate"), message
 
 
-def _scan(scan: LaserScan) -> Mapping[str, Any]:
-    last = scan.angle_min + scan.angle_increment * max(0, scan.ranges.size - 1)
-    return {
-        "pose": _as_pose(scan.mount),
-        "start_angle": scan.angle_min,
-        "end_angle": last,
-        "ranges": [round(one, 3) for one in scan.ranges.tolist()],
-        "intensities": [],
-    }
+def _channel(topic: str, schema: str) -> Channel:
+    name = f"foxglove.{schema}"
+    return Channel(topic, name, orjson.dumps(_SCHEMAS[name]))
 
 
 def _entity(seen: Detection, base: str) -> Mapping[str, Any]:
@@ -118,78 +136,3 @@ def _vector(x: float, y: float, z: float = 0.0) -> Mapping[str, float]:
 
 def _turn(yaw: float) -> Mapping[str, float]:
     return {"x": 0.0, "y": 0.0, "z": math.sin(yaw / 2), "w": math.cos(yaw / 2)}
-
-
-# --- thinned ----------------------------------------------------------------------
-
-DRAWN_APART_S: dict[type[Observation], float] = {
-    Odometry: 0.1,
-    LaserScan: 0.2,
-    DetectionFrame: 0.2,
-}
-"""What viewers draw, and the least time between two of a robot (s)."""
-_EARLY = 0.95
-_DRAWN = Odometry | LaserScan | DetectionFrame
-_Stream = tuple[str, type[Observation]]
-
-
-class Drawing:
-    """Reads messages once more, for viewers alone.
-
-    Args:
-        apikey: First part of every measure topic.
-        robots: The fleet.
-    """
-
-    def __init__(self, apikey: str, robots: Sequence[str]) -> None:
-        self._robots = frozenset(robots)
-        self._at = Instant(0.0, 0.0)
-        self._found: list[Observation] = []
-        self._due: dict[_Stream, float] = {}
-        self._reader = DirectReader(apikey, robots, lambda: self._at, self)
-
-    def messages(self, came: Incoming) -> Iterator[tuple[Channel, bytes]]:
-        """Foxglove's messages of an input; none of what cannot be read."""
-        self._at, self._found = came.at, []
-        with contextlib.suppress(UnreadableError):
-            self._read(came)
-        for one in self._found:
-            for channel, value in messages_of(one, came.at.wall):
-                yield channel, orjson.dumps(value)
-
-    def _read(self, came: Incoming) -> None:
-        if came.sort is Sort.NOTIFICATION:
-            _, reading = read_notification(came.payload)
-            for one in reading.observations:
-                self._draw(one)
-        elif came.sort is Sort.MEASURE:
-            stream = self._reader.stream(came.name)
-            if stream is None or self._is_due(stream):
-                self._reader.read(came.name, came.payload)
-
-    def enqueue(self, received: Received) -> None:
-        """Draw what the reader of measures has read."""
-        self._draw(received.observation)
-
-    def reject(self, source: str, reason: str, detail: str = "") -> None:
-        """Draw nothing of what cannot be read."""
-
-    def is_early(self, *_: object) -> bool:
-        """None: what is not due was left before it was read."""
-        return False
-
-    def _draw(self, observation: Observation) -> None:
-        """Have one drawn that is due."""
-        stream = observation.robot_id, kind_of(observation)
-        is_ours = observation.robot_id in self._robots
-        if is_ours and isinstance(observation, _DRAWN) and self._is_due(stream):
-            if isinstance(observation, LaserScan) and not observation.ranges.size:
-                # A twin without its numbers takes nobody's turn.
-                return
-            self._found.append(observation)
-            apart_s = DRAWN_APART_S[kind_of(observation)] * _EARLY
-            self._due[stream] = self._at.mono + apart_s
-
-    def _is_due(self, stream: _Stream) -> bool:
-        is_drawn = stream[1] in DRAWN_APART_S
-        return is_drawn and self._at.mono >= self._due.get(stream, float("-inf"))

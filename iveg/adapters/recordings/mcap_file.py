@@ -3,21 +3,16 @@
 Read back are whole files, parts, and what a crash left.
 """
 
+import contextlib
 import logging
 import struct
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from pathlib import Path
-from typing import IO
+from typing import IO, Final, NamedTuple
 
-import orjson
 import zstandard
 from mcap.exceptions import McapError
-from mcap.reader import make_reader
-from mcap.records import Channel as ChannelRecord
-from mcap.records import Chunk, Header, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
+from mcap.reader import McapReader, NonSeekingReader, make_reader
 from mcap.writer import CompressionType, Writer
 
 from iveg import __version__
@@ -25,27 +20,33 @@ from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.observations import Instant
 
 _log = logging.getLogger(__name__)
-PROFILE = "iveg"
-CHUNK_BYTES = 1 << 18
+PROFILE: Final = "iveg"
+CHUNK_BYTES: Final = 1 << 20
 """Of what is not compressed yet; a chunk ends when it has more."""
-_NS = 10**9
+_PADDING: Final = "/iveg/padding"
+"""Topic of zeros by which earlier versions ended a chunk."""
+_NS: Final = 10**9
+FOREVER: Final = 9e9
+"""Later than every moment of a recording (Unix s)."""
 
 
-@dataclass(frozen=True, slots=True)
-class Channel:
+class Channel(NamedTuple):
     """A topic of a recording, with the name and JSON Schema of its messages."""
 
     topic: str
     schema: str
-    shape: Mapping[str, object] = field(default_factory=lambda: {"type": "object"})
+    shape: bytes = b'{"type":"object"}'
 
 
-PADDING = Channel("/iveg/padding", "iveg.Padding")
-_ZEROS = b'{"zeros":"' + b"0" * CHUNK_BYTES + b'"}'
+NOTIFICATIONS: Final = Channel("/ngsi/notifications", "ngsi.Notification")
+MEASURE: Final = "iveg.Measure"
+"""Schema of robots' own messages."""
+RecordedMessage = tuple[Channel, int, bytes]
+"""Channel, ``log_time`` (ns), payload."""
 
 
 class McapFile:
-    """A recording that is being written; for one thread.
+    """A recording that is being written; for one thread at a time.
 
     A message's ``log_time`` is the wall clock at the beginning plus the monotonic time
     since then, so that a clock that is set neither reorders nor stretches it.
@@ -70,32 +71,22 @@ class McapFile:
         self._writer.add_metadata(PROFILE, {"version": __version__, **began})
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
-        self._newest_ns = self._start_ns
-        self._is_settled = True
 
     def add(self, channel: Channel, at: Instant, payload: bytes) -> None:
         """Append a message of JSON."""
-        self.add_at(channel, self._ns(at), payload)
+        log_time = self._start_ns + round((at.mono - self.start.mono) * _NS)
+        self.add_at(channel, log_time, payload)
 
     def add_at(self, channel: Channel, log_time: int, payload: bytes) -> None:
         """Append a message at a time of this file's own (ns)."""
         number = self._channels.get(channel.topic)
         if number is None:
             number = self._register(channel)
-        self._newest_ns = log_time
         self._writer.add_message(number, log_time, payload, log_time)
-        self._is_settled = False
 
-    def settle(self) -> None:
-        """Have everything so far survive the process.
-
-        The library ends a chunk by its size alone, so zeros fill it, which cost nothing
-        once they are compressed.
-        """
-        if not self._is_settled:
-            self.add_at(PADDING, self._newest_ns, _ZEROS)
-            self._stream.flush()
-            self._is_settled = True
+    def flush(self) -> None:
+        """Have everything so far survive the process."""
+        self._writer.flush()
 
     def finish(self) -> None:
         """Write the index, and close the file."""
@@ -104,203 +95,95 @@ class McapFile:
         finally:
             self._stream.close()
 
-    def _ns(self, at: Instant) -> int:
-        return self._start_ns + round((at.mono - self.start.mono) * _NS)
-
     def _register(self, channel: Channel) -> int:
-        schema = self._schemas.get(channel.schema)
+        topic, name, shape = channel
+        schema = self._schemas.get(name)
         if schema is None:
-            shape = orjson.dumps(channel.shape)
-            schema = self._writer.register_schema(channel.schema, "jsonschema", shape)
-            self._schemas[channel.schema] = schema
-        number = self._writer.register_channel(channel.topic, "json", schema)
-        self._channels[channel.topic] = number
+            schema = self._writer.register_schema(name, "jsonschema", shape)
+            self._schemas[name] = schema
+        number = self._writer.register_channel(topic, "json", schema)
+        self._channels[topic] = number
         return number
 
 
-# --- reading ----
+# --- reading ----------------------------------------------------------------------
 
-RecordedMessage = tuple[Channel, int, bytes]
-"""Channel, ``log_time`` (ns), payload."""
-BROKEN = (
+_BROKEN = (
     McapError,
-    CRCValidationError,
     zstandard.ZstdError,
     struct.error,
     ValueError,
     KeyError,
+    MemoryError,
 )
-"""What reading says of a file that is cut off, damaged or of another format."""
-LONGEST_RECORD = 1 << 28
-_LARGEST_CHUNK = 1 << 26
-"""Bytes of a chunk that is unpacked; ours have a quarter of a megabyte."""
+"""Errors of reading a file that is cut off, damaged or of another format."""
 
 
 def is_own(path: Path) -> bool:
     """Whether a file is a recording of iVeg's, and not another program's MCAP."""
     try:
         with path.open("rb") as stream:
-            header = next(iter(_records(stream)))
-    except (OSError, StopIteration, *BROKEN):
+            return make_reader(stream).get_header().profile == PROFILE
+    except (OSError, StopIteration, *_BROKEN):
         return False
-    return isinstance(header, Header) and header.profile == PROFILE
 
 
-@contextmanager
-def read_messages(path: Path) -> Iterator["Reading"]:
-    """Open a recording.
+def read_messages(
+    path: Path, since: float = 0.0, until: float = FOREVER
+) -> Iterator[RecordedMessage]:
+    """Messages of a recording between two moments (Unix s), oldest first.
 
     Raises:
-        DataFileError: it cannot be read, or no iVeg wrote it.
+        DataFileError: behind the last that can be read, where the file breaks off.
+        OSError: the disk refuses.
     """
+    with path.open("rb") as stream:
+        try:
+            reader = _reader(stream)
+            found = reader.iter_messages(
+                # Only by an index can it be done without holding all of the file.
+                log_time_order=not isinstance(reader, NonSeekingReader),
+                starting_at=round(since * _NS),
+                ending_before=round(until * _NS),
+            )
+            for schema, channel, message in found:
+                if schema is not None and channel.topic != _PADDING:
+                    name = Channel(channel.topic, schema.name, schema.data)
+                    yield name, message.log_time, message.data
+        except _BROKEN as error:
+            raise DataFileError(str(path), "", f"breaks off: {error}.") from error
+
+
+def _reader(stream: IO[bytes]) -> McapReader:
+    """Reader by the index; without one, such as in an open file, from the beginning."""
     try:
-        with path.open("rb") as stream:
-            yield Reading(path, stream)
-    except OSError as error:
-        raise DataFileError(str(path), "", f"cannot be read: {error}.") from error
+        reader = make_reader(stream, validate_crcs=True)
+        reader.get_summary()
+    except (OSError, *_BROKEN):
+        stream.seek(0)
+        return NonSeekingReader(stream, validate_crcs=True)
+    return reader
 
 
-@dataclass
-class Reading:
-    """Messages in the order in which they came, as far as the file can be read.
-
-    Attributes:
-        start: Its beginning, on both clocks.
-        is_whole: Whether nothing is missing at its end; known once it was read.
-    """
-
-    path: Path
-    stream: IO[bytes]
-    is_whole: bool = False
-    _channels: dict[int, Channel] = field(default_factory=dict)
-    _schemas: dict[int, Schema] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        self._records = _records(self.stream)
-        self.start = self._begin()
-
-    def __iter__(self) -> Iterator[RecordedMessage]:
-        """Raises nothing of the format: a file ends where it cannot be read on."""
-        try:
-            for record in self._records:
-                if isinstance(record, Schema):
-                    self._schemas[record.id] = record
-                elif isinstance(record, ChannelRecord):
-                    self._channels[record.id] = self._channel(record)
-                elif isinstance(record, Message):
-                    channel = self._channels[record.channel_id]
-                    if channel != PADDING:
-                        yield channel, record.log_time, record.data
-        except BROKEN:
-            return
-        self.is_whole = True
-
-    def seconds(self, log_time: int) -> float:
-        """Since the beginning (s)."""
-        return (log_time - round(self.start.wall * _NS)) / _NS
-
-    def instant(self, log_time: int) -> Instant:
-        """The moment on both clocks, where the wall clock was not set meanwhile."""
-        return self.start.later(self.seconds(log_time))
-
-    def _begin(self) -> Instant:
-        try:
-            for record in self._records:
-                if isinstance(record, Metadata) and record.name == PROFILE:
-                    began = record.metadata
-                    return Instant(float(began["mono"]), float(began["wall"]))
-                if not isinstance(record, Header) or record.profile != PROFILE:
-                    break
-        except BROKEN as error:
-            raise self._unusable(f"is no MCAP: {error}.") from error
-        raise self._unusable("is no recording of iVeg.")
-
-    def _channel(self, record: ChannelRecord) -> Channel:
-        schema = self._schemas[record.schema_id]
-        return Channel(record.topic, schema.name, orjson.loads(schema.data))
-
-    def _unusable(self, reason: str) -> DataFileError:
-        return DataFileError(str(self.path), "", reason)
-
-
-def unpack(chunk: Chunk) -> Sequence[McapRecord]:
-    """The records of a chunk.  One of ``BROKEN`` is raised where it is damaged.
-
-    A few bytes can claim to be gigabytes: the size is known before any is unpacked.
-    """
-    size = max(chunk.uncompressed_size, len(chunk.data))
-    if chunk.compression == "zstd":
-        size = max(size, zstandard.frame_content_size(chunk.data))
-    elif chunk.compression:
-        raise ValueError(f"compressed by {chunk.compression}")
-    if size > _LARGEST_CHUNK:
-        raise ValueError(f"a chunk of {size} bytes")
-    return breakup_chunk(chunk, validate_crc=True)
-
-
-def _records(stream: IO[bytes]) -> Iterator[McapRecord]:
-    reader = StreamReader(
-        stream,
-        emit_chunks=True,
-        validate_crcs=True,
-        record_size_limit=LONGEST_RECORD,
-    )
-    for record in reader.records:
-        if isinstance(record, Chunk):
-            yield from unpack(record)
-        else:
-            yield record
-
-
-# --- parts ------------------------------------------------------------------------
+# --- parts, and what a crash left -------------------------------------------------
 
 
 def write_excerpt(folder: Path, target: Path, since: float, until: float) -> int:
-    """Copy what came in between two moments (Unix s); how many messages.
+    """Copy what came in between two moments (Unix s); returns how many messages.
 
     A file that is damaged gives what can be read of it.
 
     Raises:
         HopError: the disk is full or away.
     """
-    first, last = round(since * _NS), round(until * _NS)
-    copied = 0
     try:
         excerpt = McapFile(target, Instant(0.0, since))
-        for path in sorted(folder.glob("*.mcap*")):
-            for channel, log_time, payload in _between(path, first, last):
-                excerpt.add_at(channel, log_time, payload)
-                copied += 1
+        paths = sorted(folder.glob("*.mcap*"))
+        copied = sum(_copy(path, excerpt, since, until) for path in paths)
         excerpt.finish()
     except OSError as error:
         raise HopError("disk", error.strerror or str(error)) from error
     return copied
-
-
-def _between(path: Path, first: int, last: int) -> Iterator[RecordedMessage]:
-    try:
-        if path.suffix == ".mcap":
-            yield from _by_index(path, first, last)
-            return
-        with read_messages(path) as reading:
-            yield from (one for one in reading if first <= one[1] < last)
-    except (DataFileError, McapError):
-        return
-
-
-def _by_index(path: Path, first: int, last: int) -> Iterator[RecordedMessage]:
-    """Read only the chunks of a finished file that have these moments."""
-    with path.open("rb") as stream:
-        reader = make_reader(stream)
-        found = reader.iter_messages(starting_at=first, ending_before=last)
-        for schema, channel, message in found:
-            if schema is not None and channel.topic != PADDING.topic:
-                shape = orjson.loads(schema.data)
-                name = Channel(channel.topic, schema.name, shape)
-                yield name, message.log_time, message.data
-
-
-# --- what a crash left --------------------------------------------------------------
 
 
 def finish_broken(path: Path) -> None:
@@ -311,14 +194,12 @@ def finish_broken(path: Path) -> None:
     Raises:
         HopError: the disk is full or away.
     """
-    rescued = path.with_suffix(".rescued")
+    rescued = path.with_name("rescued")
     try:
         rescued.unlink(missing_ok=True)
-        with read_messages(path) as reading:
-            file = McapFile(rescued, reading.start)
-            for channel, log_time, payload in reading:
-                file.add_at(channel, log_time, payload)
-            file.finish()
+        file = McapFile(rescued, _start_of(path))
+        _copy(path, file)
+        file.finish()
         rescued.rename(path.with_suffix(""))
     except DataFileError as error:
         # Not even its beginning was on the disk.
@@ -328,3 +209,26 @@ def finish_broken(path: Path) -> None:
         rescued.unlink(missing_ok=True)
         raise HopError("disk", error.strerror or str(error)) from error
     path.unlink()
+
+
+def _copy(
+    source: Path, target: McapFile, since: float = 0.0, until: float = FOREVER
+) -> int:
+    """Copy messages as far as they can be read; returns how many."""
+    copied = 0
+    # The file that is written gets another name when it is finished.
+    with contextlib.suppress(DataFileError, FileNotFoundError):
+        for channel, log_time, payload in read_messages(source, since, until):
+            target.add_at(channel, log_time, payload)
+            copied += 1
+    return copied
+
+
+def _start_of(path: Path) -> Instant:
+    """Beginning of a recording on both clocks.  Raises DataFileError."""
+    try:
+        with path.open("rb") as stream:
+            began = next(NonSeekingReader(stream).iter_metadata()).metadata
+        return Instant(float(began["mono"]), float(began["wall"]))
+    except (StopIteration, *_BROKEN) as error:
+        raise DataFileError(str(path), "", "has not even a beginning.") from error

@@ -1,240 +1,114 @@
-"""Records what comes in, off the path of everything else: one queue, one process.
+"""Records what comes in, off the path of everything else: one queue, one thread.
 
-The loop packs each input and no more.  Four times a second what waits goes to the
-process that writes (``writer.py``), in pieces that its pipe takes; who waits for the
-pipe is a task of its own.  What does not fit into the queue is not recorded, and
-counted; so is what a process that ended had not kept yet.
+The loop queues each message and no more.  Ten times a second a thread writes what
+waits, a few milliseconds each time.  What does not fit into the queue is not recorded,
+and counted.
 """
 
 import asyncio
 import contextlib
 import logging
-import sys
-from asyncio.subprocess import PIPE, Process
-from collections import Counter, deque
-from collections.abc import Callable, Iterable, Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import Final, NoReturn, TypeVar
+from typing import Final, ParamSpec, TypeVar
 
-import orjson
-
-import iveg
 from iveg.adapters.files import disk_space
-from iveg.adapters.recordings.incoming import Sort, pack
-from iveg.adapters.recordings.mcap_file import finish_broken, write_excerpt
-from iveg.adapters.recordings.writer import PRUNE_S, SETUP, WriterSetup
+from iveg.adapters.recordings.directory import RecordingDirectory
+from iveg.adapters.recordings.foxglove import Drawing
+from iveg.adapters.recordings.mcap_file import (
+    MEASURE,
+    NOTIFICATIONS,
+    Channel,
+    finish_broken,
+    write_excerpt,
+)
+from iveg.adapters.recordings.pictures import PICTURES, PICTURES_S
+from iveg.adapters.recordings.writer import Message, RecordingWriter
 from iveg.adapters.worker import Worker
-from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError
-from iveg.domain.observations import Instant
-from iveg.domain.recordings import RecordingFile
-from iveg.domain.records import Record, is_telemetry
+from iveg.domain.observations import Instant, Received
+from iveg.domain.recordings import RecordingFile, RecordingLimits
 from iveg.domain.retention import DiskSpace
 from iveg.vital.ports import Clock
-from iveg.vital.record import RecordSink
 
 _log = logging.getLogger(__name__)
+_P = ParamSpec("_P")
 _T = TypeVar("_T")
-PART = "recordings"
+PART: Final = "recordings"
 MOST_WAITING, MOST_BYTES = 20_000, 32 * 10**6
-WRITE_S = 0.25
-RESCUE_S = 1800.0
-QUIET_S = 60.0
+WRITE_S: Final = 0.1
+RESCUE_S: Final = 1800.0
+QUIET_S: Final = 60.0
 """What is dropped is told again where nothing was for so long (s)."""
-PIECE_BYTES = 1 << 16
-GRACE_S = 5.0
-_GONE = OSError, RuntimeError
-"""What a pipe says whose reader has ended; loops differ.  A timeout is an OSError."""
-_MODULE: Final = "iveg.adapters.recordings.writer"
-_BESIDE_IVEG = Path(iveg.__file__).parents[1]
-
-
-class WriterProcess:
-    """One process, from its start to its end.
-
-    Args:
-        process: Just started, with pipes.
-        counters: Gets ``recordings_written`` inputs, and ``recordings_dropped``: those
-            that it refused, or had not kept when it ended.
-    """
-
-    def __init__(self, process: Process, counters: Counter[str]) -> None:
-        if process.stdin is None or process.stdout is None:
-            raise ValueError("it needs both pipes")
-        self._process = process
-        self._inputs, self._answers = process.stdin, process.stdout
-        self._waiting: deque[bytes] = deque()
-        self._counters = counters
-        self._handed = 0
-        self._answered: Counter[str] = Counter()
-
-    @classmethod
-    async def start(cls, setup: WriterSetup, counters: Counter[str]) -> "WriterProcess":
-        """Start one.
-
-        Raises:
-            HopError: it does not start.
-        """
-        try:
-            # In a session of its own Ctrl-C does not reach it: its input ends it.
-            process = await asyncio.create_subprocess_exec(
-                *(sys.executable, "-m", _MODULE),
-                stdin=PIPE,
-                stdout=PIPE,
-                cwd=_BESIDE_IVEG,
-                start_new_session=True,
-            )
-        except OSError as error:
-            raise HopError("recordings", error.strerror or str(error)) from error
-        started = cls(process, counters)
-        started._waiting.append(SETUP.dump_json(setup) + b"\n")
-        return started
-
-    @property
-    def pid(self) -> int:
-        """Id of the process."""
-        return self._process.pid
-
-    async def feed(self, packed: Iterable[bytes]) -> None:
-        """Hand over inputs, and count them; waits for the pipe.
-
-        Who is cancelled meanwhile hands over the rest the next time.  The end of the
-        process is what ``listen`` tells.
-        """
-        before = len(self._waiting)
-        self._waiting += packed
-        self._handed += len(self._waiting) - before
-        with contextlib.suppress(*_GONE):
-            while self._waiting:
-                self._inputs.write(self._next_piece())
-                await self._inputs.drain()
-                # A pipe that takes all at once holds up nobody either.
-                await asyncio.sleep(0)
-
-    def _next_piece(self) -> bytes:
-        piece, size = [], 0
-        while self._waiting and size < PIECE_BYTES:
-            piece.append(self._waiting.popleft())
-            size += len(piece[-1])
-        return b"".join(piece)
-
-    async def listen(self) -> NoReturn:
-        """Take what it says until it ends; what it had not kept then is lost.
-
-        Raises:
-            HopError: always, with the reason why it ended.
-        """
-        refused = ""
-        while line := await self._answers.readline():
-            answer = orjson.loads(line)
-            refused = answer.pop("refused", "")
-            if answer:
-                self._count(answer)
-        code = await self._process.wait()
-        lost = self._handed - self._answered.total()
-        self._handed -= lost
-        self._counters["recordings_dropped"] += lost
-        if refused:
-            raise HopError("disk", refused)
-        raise HopError("recordings", f"its process has ended: {code}")
-
-    def _count(self, counts: dict[str, int]) -> None:
-        """Count what became of inputs since it began."""
-        fresh = Counter(counts) - self._answered
-        self._answered = Counter(counts)
-        for what, count in fresh.items():
-            self._counters[f"recordings_{what}"] += count
-
-    async def end(self, packed: Iterable[bytes] = ()) -> None:
-        """Have it take these, too, and finish; one that hangs is killed."""
-        with contextlib.suppress(HopError, *_GONE):
-            async with asyncio.timeout(GRACE_S):
-                await self.feed(packed)
-                self._inputs.close()
-                await self.listen()
-        if self._process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                self._process.kill()
-            await self._process.wait()
+GRACE_S: Final = 5.0
 
 
 class InputRecorder:
-    """Records what comes in; its methods are called in the loop and never wait.
+    """Records what comes in; what a message calls never waits.
 
     Args:
-        setup: Of the process that writes.
-        clock: For the time of rows.
-        is_on: Whether anything is recorded; what there is, is kept in bounds anyway.
+        folder: Of the recordings of inputs; pictures are in a folder of it.
+        clock: For the writer's pace.
+        limits: How much of inputs and of pictures is kept.
         read_space: Room on the disk of a directory.
 
     Attributes:
-        counters: Inputs ``recordings_written``, and ``recordings_dropped`` for want of
-            room, or because the process ended before they were kept.
-        rule: Tells the rule in force, of which each version is recorded.
+        counters: Messages ``recordings_written``, and ``recordings_dropped`` for want
+            of room.
+        pictures: Folder of the pictures of the past.
     """
 
     def __init__(
         self,
-        setup: WriterSetup,
+        folder: Path,
         clock: Clock,
-        *,
-        is_on: bool = True,
+        limits: tuple[RecordingLimits, RecordingLimits] | None = None,
         read_space: Callable[[Path], DiskSpace] = disk_space,
     ) -> None:
         self.counters = Counter[str]()
-        self.rule: Callable[[], DetectionRule | None] = lambda: None
-        self._setup, self._clock = setup, clock
-        self._is_wanted = self._is_on = is_on
-        self._read_space = read_space
-        self._directory, self._pictures = setup.directories()
+        self.pictures = folder / "pictures"
+        of_inputs, of_pictures = limits or (RecordingLimits(), RecordingLimits())
+        self._inputs = RecordingDirectory(folder, of_inputs)
+        pictures = RecordingDirectory(self.pictures, of_pictures, PICTURES_S)
+        self._directories = self._inputs, pictures
+        self._writer = RecordingWriter(*self._directories, read_space)
+        self._clock, self._drawing = clock, Drawing()
+        self._thread = ThreadPoolExecutor(1, PART)
         # What a crash left takes minutes: not in this process.
         self._apart = Worker(limit_s=RESCUE_S)
-        self._waiting: list[bytes] = []
+        self._waiting: list[Message] = []
         self._bytes = 0
         self._dropped_at = float("-inf")
-        self._told_rule: DetectionRule | None = None
-        self._writer: WriterProcess | None = None
 
     # --- what comes in ------------------------------------------------------------
 
     def measure(self, topic: str, payload: bytes, at: Instant) -> None:
-        """A robot's own message, read from the broker."""
-        if self._is_on:
-            self._queue(pack(Sort.MEASURE, at, topic, payload))
+        """Record a robot's own message, read from the broker."""
+        self._queue(Message(Channel(topic, MEASURE), at, payload))
 
     def notification(self, body: bytes, at: Instant) -> None:
-        """A notification of Orion's."""
-        if self._is_on:
-            self._queue(pack(Sort.NOTIFICATION, at, "", body))
+        """Record a notification of Orion's."""
+        self._queue(Message(NOTIFICATIONS, at, body))
 
-    def row(self, record: Record) -> None:
-        """A row of the history; telemetry is here already, as it came."""
-        if self._is_on and not is_telemetry(record):
-            self._write_down(record, type(record).__name__.removesuffix("Record"))
+    def draw(self, received: Received) -> None:
+        """Record what viewers draw of an observation."""
+        for channel, payload in self._drawing.messages(received):
+            self._queue(Message(channel, received.at, payload))
 
     def picture(self, payload: bytes, at: Instant) -> bool:
-        """Queue a picture of what pages were sent; whether there is room for it."""
-        return self._is_on and self._queue(pack(Sort.PICTURE, at, payload=payload))
+        """Record a picture of what pages were sent; whether there is room for it."""
+        return self._queue(Message(PICTURES, at, payload))
 
-    def note_rule(self) -> None:
-        """The rule in force, where it is another than before."""
-        rule = self.rule()
-        if rule is not None and rule is not self._told_rule:
-            self._told_rule = rule
-            self._write_down(rule, "Rule")
-
-    def _write_down(self, row: Record | DetectionRule, name: str) -> None:
-        payload = orjson.dumps(row, default=dict, option=orjson.OPT_SERIALIZE_NUMPY)
-        self._queue(pack(Sort.ROW, self._clock(), name, payload))
-
-    def _queue(self, one: bytes) -> bool:
-        is_full = len(self._waiting) >= MOST_WAITING
-        if is_full or self._bytes + len(one) > MOST_BYTES:
+    def _queue(self, message: Message) -> bool:
+        size = len(message.payload)
+        if len(self._waiting) >= MOST_WAITING or self._bytes + size > MOST_BYTES:
             self._drop()
             return False
-        self._waiting.append(one)
-        self._bytes += len(one)
+        self._waiting.append(message)
+        self._bytes += size
         return True
 
     def _drop(self) -> None:
@@ -244,120 +118,85 @@ class InputRecorder:
             _log.warning("not everything that comes in is recorded: the disk is slow")
         self._dropped_at = now
 
-    # --- the process that writes --------------------------------------------------
+    # --- the thread that writes ---------------------------------------------------
 
     async def run(self) -> None:
         """Until cancelled; ``close`` still writes what waits then.
 
         Raises:
-            HopError: the process ended, or the disk refuses or has too little room.
+            HopError: the disk refuses.
         """
-        folders = self._directory, self._pictures
-        left = [one for each in folders for one in await _in_thread(each.left_open)]
+        left = await self._blocking(self._writer.left_open)
         rescue = asyncio.create_task(self._rescue(left), name="recordings-rescue")
         try:
-            if self._is_wanted:
-                await self._have_written()
-            else:
-                await self._prune_forever()
+            while True:
+                await self.write()
+                await asyncio.sleep(WRITE_S)
         finally:
             rescue.cancel()
             await asyncio.gather(rescue, return_exceptions=True)
 
-    async def _have_written(self) -> None:
-        """Feed one process until it ends.  Raises HopError."""
-        self._is_on = await _in_thread(self._has_room)
-        if not self._is_on:
-            self.take_waiting()
-            raise HopError("disk", f"less than {self._setup.room / 1e9:.0f} GB free")
-        writer = self._writer = await WriterProcess.start(self._setup, self.counters)
-        feed = asyncio.create_task(self._feed(writer), name="recordings-feed")
+    async def write(self) -> None:
+        """Write what waits.  Raises HopError: the disk refuses."""
+        waiting, self._waiting, self._bytes = self._waiting, [], 0
+        written = 0
         try:
-            await writer.listen()
+            now = self._clock().mono
+            written = await self._blocking(self._writer.write, waiting, now)
         except HopError:
-            # The next one is told the rule anew.
-            self._writer = self._told_rule = None
+            # A file that cannot be finished is one that a crash left.
+            with contextlib.suppress(HopError):
+                await self._blocking(self._writer.finish)
             raise
         finally:
-            feed.cancel()
-            await asyncio.gather(feed, return_exceptions=True)
-
-    def _has_room(self) -> bool:
-        """Whether recordings fit, those that are there among them."""
-        folder = self._directory.path
-        folder.mkdir(parents=True, exist_ok=True)
-        self._prune()
-        own = sum(
-            one.size for one in (*self._directory.files(), *self._pictures.files())
-        )
-        return self._read_space(folder).free + own >= self._setup.room
-
-    async def _feed(self, writer: WriterProcess) -> None:
-        while True:
-            await asyncio.sleep(WRITE_S)
-            self.note_rule()
-            await writer.feed(self.take_waiting())
-
-    @property
-    def waiting(self) -> int:
-        """Inputs that wait for the process that writes."""
-        return len(self._waiting)
-
-    @property
-    def pid(self) -> int | None:
-        """Id of the process that writes; None while there is none."""
-        return None if self._writer is None else self._writer.pid
-
-    def take_waiting(self) -> Sequence[bytes]:
-        """Take the inputs that wait for the process that writes."""
-        waiting, self._waiting, self._bytes = self._waiting, [], 0
-        return waiting
+            self.counters["recordings_written"] += written
+            self.counters["recordings_dropped"] += len(waiting) - written
 
     async def close(self) -> None:
-        """Write what waits, and finish the file."""
-        writer, self._writer = self._writer, None
-        if writer is not None:
-            await writer.end(self.take_waiting())
+        """Write what waits, and finish the files; a disk that hangs is left."""
+        with contextlib.suppress(HopError, TimeoutError):
+            async with asyncio.timeout(GRACE_S):
+                await self.write()
+                await self._blocking(self._writer.finish)
+        self._thread.shutdown(wait=False, cancel_futures=True)
         self._apart.close()
-
-    async def _prune_forever(self) -> None:
-        while True:
-            await _in_thread(self._prune)
-            await asyncio.sleep(PRUNE_S)
-
-    def _prune(self) -> None:
-        for folder in (self._directory, self._pictures):
-            folder.prune()
 
     async def _rescue(self, left: Sequence[Path]) -> None:
         for path in left:
             await self._apart.run(finish_broken, path)
 
+    async def _blocking(
+        self, work: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs
+    ) -> _T:
+        """Do it in the thread, one after the other.  Raises HopError."""
+        loop = asyncio.get_running_loop()
+        try:
+            return await loop.run_in_executor(
+                self._thread, partial(work, *args, **kwargs)
+            )
+        except OSError as error:
+            raise HopError("disk", error.strerror or str(error)) from error
+
     # --- what there is ------------------------------------------------------------
 
     async def drop_oldest(self) -> bool:
         """Delete the oldest recording; whether there was one that is finished."""
-        return await _in_thread(self._drop_oldest)
+        return await self._blocking(self._drop_oldest)
 
     def _drop_oldest(self) -> bool:
-        folders = self._directory, self._pictures
-        finished = [one for each in folders if (one := each.oldest()) is not None]
-        for one in sorted(finished, key=lambda path: path.name)[:1]:
-            one.unlink(missing_ok=True)
+        finished = [path for each in self._directories for path in each.finished()]
+        if finished:
+            min(finished, key=lambda path: path.name).unlink(missing_ok=True)
         return bool(finished)
 
     async def files(self) -> Sequence[RecordingFile]:
-        """All recordings, oldest first."""
-        return await _in_thread(self._directory.files)
-
-    @property
-    def pictures(self) -> Path:
-        """Folder of the pictures of the past."""
-        return self._pictures.path
+        """All recordings of what came in, oldest first."""
+        return await self._blocking(self._inputs.files)
 
     async def finished(self, name: str) -> Path | None:
-        """The file of a finished recording."""
-        return await _in_thread(partial(self._directory.finished, name))
+        """The file of a finished recording; None where there is none of this name."""
+        paths = await self._blocking(self._inputs.finished)
+        return next((path for path in paths if path.name == name), None)
 
     async def excerpt(self, target: Path, since: float, until: float) -> int:
         """Write what came in between two moments (Unix s) as one recording.
@@ -365,29 +204,5 @@ class InputRecorder:
         Returns:
             How many messages.  What came in the last two seconds may be missing.
         """
-        folder = self._directory.path
+        folder = self._inputs.path
         return await self._apart.run(write_excerpt, folder, target, since, until)
-
-
-class RecordedSink:
-    """The history's recorder, whose rows are recorded here, too.
-
-    Implements ``pipeline.record.RecordSink``.
-    """
-
-    def __init__(self, history: RecordSink, row: Callable[[Record], None]) -> None:
-        self._history, self._row = history, row
-        self.flushed = history.flushed
-
-    def enqueue(self, record: Record) -> None:
-        """Queue a record in both."""
-        self._history.enqueue(record)
-        self._row(record)
-
-
-async def _in_thread(work: Callable[[], _T]) -> _T:
-    """Have it done where the disk may be slow.  Raises HopError."""
-    try:
-        return await asyncio.to_thread(work)
-    except OSError as error:
-        raise HopError("disk", error.strerror or str(error)) from error

@@ -4,14 +4,20 @@ import gzip
 import logging
 import zlib
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Annotated, Literal, get_args
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from iveg.adapters.recordings.incoming import NOTIFICATIONS
-from iveg.adapters.recordings.mcap_file import Channel, is_own, read_messages
+from iveg.adapters.recordings.mcap_file import (
+    MEASURE,
+    NOTIFICATIONS,
+    Channel,
+    is_own,
+    read_messages,
+)
 from iveg.domain.errors import DataFileError, UnreadableError
 from iveg.domain.geometry import Pose2D, Twist2D, box_of_a_person
 from iveg.domain.observations import (
@@ -190,7 +196,6 @@ def _read(line: bytes) -> RecordingEntry:
 __all__ = ["OwnRecording", "is_own"]
 
 Played = Odometry | LaserScan | DetectionFrame
-_MEASURE = "iveg.Measure"
 _Identity = tuple[str, type[Observation], str | None, int | None]
 
 
@@ -216,25 +221,27 @@ class OwnRecording:
             DataFileError: the recording breaks off.
         """
         known: set[_Identity] = set()
-        start: float | None = None
-        with read_messages(self._path) as reading:
-            for channel, log_time, payload in reading:
-                at = reading.seconds(log_time)
+        start: int | None = None
+        for at, played in self._all():
+            if played.robot_id != self._robot_id or _is_known(played, known):
+                continue
+            start = at if start is None else start
+            yield RecordingEntry((at - start) / 1e9, played)
+
+    def _all(self) -> Iterator[tuple[int, Played]]:
+        """When each observation of any robot came (ns).  Raises DataFileError."""
+        try:
+            for channel, log_time, payload in read_messages(self._path):
                 for played in _played(channel, payload):
-                    if played.robot_id != self._robot_id or _is_known(played, known):
-                        continue
-                    start = at if start is None else start
-                    yield RecordingEntry(at - start, played)
-        if not reading.is_whole:
-            raise self._unusable("breaks off; iVeg finishes it at its next start.")
+                    yield log_time, played
+        except OSError as error:
+            raise self._unusable(f"cannot be read: {error}.") from error
 
     def _only_robot(self) -> str:
-        with read_messages(self._path) as reading:
-            robots = {
-                played.robot_id
-                for channel, _, payload in reading
-                for played in _played(channel, payload)
-            }
+        robots: set[str] = set()
+        # A robot in what can be read is played as far as that goes.
+        with suppress(DataFileError):
+            robots.update(played.robot_id for _, played in self._all())
         if len(robots) == 1:
             return robots.pop()
         if not robots:
@@ -249,7 +256,7 @@ class OwnRecording:
 def _played(channel: Channel, payload: bytes) -> Iterator[Played]:
     """Observations of a robot's run in a message; none where it cannot be read."""
     try:
-        if channel.schema == _MEASURE:
+        if channel.schema == MEASURE:
             device = _device_of(channel.topic)
             observations = codec.read_measure(device, payload).observations
         elif channel.topic == NOTIFICATIONS.topic:

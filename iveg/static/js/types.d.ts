@@ -650,8 +650,6 @@ export type PastWorld = {
   at: string;
   /** The same (Unix s). */
   at_s: number;
-  /** Whether another recording has this moment, too: the server's clock was set back. */
-  recorded_twice: boolean;
   /** Topics of the recording that this version does not know. */
   left_out: string[];
   scans: Scan[];

@@ -1,7 +1,7 @@
 """Pictures of the past: what pages are sent, written down, and read back as a world.
 
-A picture is a frame of telemetry (docs/interfaces/live.md) with all other topics as
-parts, too: a whole one every ten seconds, between them what has changed.
+A picture is what pages are sent of all topics (docs/interfaces/recordings.md): a whole
+one every ten seconds, between them what has changed.
 """
 
 import asyncio
@@ -12,9 +12,7 @@ from typing import Any, Final
 import numpy as np
 import orjson
 
-from iveg.adapters.recordings.incoming import CHANGED, WHOLE, WHOLE_S
-from iveg.adapters.recordings.pictures import PictureFiles
-from iveg.domain.errors import HopError
+from iveg.adapters.recordings.pictures import CHANGED, WHOLE, WHOLE_S, PictureFiles
 from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import write_json
@@ -22,7 +20,6 @@ from iveg.vital import topics
 from iveg.vital.ports import Clock
 from iveg.vital.publish import Hub
 from iveg.web.live.encoder import Encoder
-from iveg.web.live.feed import STATE_S
 from iveg.web.live.telemetry import NO_RETURN
 from iveg.web.views import Views
 
@@ -30,10 +27,6 @@ PICTURE_S: Final = 0.2
 """Between two pictures."""
 REFUSED_S: Final = 2.0
 """Until the next one where there was no room: a whole one costs more than changes."""
-TURN_S: Final = 0.002
-"""So long parts are written before others have their turn."""
-MOST_WAITING: Final = 16
-"""Questions that wait for their turn; one more is refused."""
 _COMMANDS: Final = "commands"
 _AT_ONCE: Final = tuple(
     row.name
@@ -48,7 +41,7 @@ class PictureRecorder:
     """Writes down what pages are sent, five times a second.
 
     Args:
-        encoder: Has encoded most of it for pages already.
+        encoder: Encodes scans.
         views: The rest.
         hub: Tells what has changed.
         clock: For the time of pictures.
@@ -71,18 +64,14 @@ class PictureRecorder:
     def _begin_anew(self) -> None:
         """Forget what the picture before had."""
         self._versions: dict[str, int] = {}
-        self._moves: dict[str, bytes] = {}
         self._log_id = -1
-        self._commands = b""
+        self._commands: object = None
 
     async def run(self) -> None:
         """Until cancelled."""
-        due = self._clock().mono
         while True:
-            pause_s = PICTURE_S if await self.take() else REFUSED_S
-            now = self._clock().mono
-            due = max(due + pause_s, now)
-            await asyncio.sleep(due - now)
+            is_taken = await self.take()
+            await asyncio.sleep(PICTURE_S if is_taken else REFUSED_S)
 
     async def take(self) -> bool:
         """One picture; whether it was taken.  Others have their turn between its parts.
@@ -94,18 +83,19 @@ class PictureRecorder:
         if is_whole:
             self._begin_anew()
             self._whole_at = now.mono
-        parts, moves, scans = self._rest(now), list[bytes](), list[bytes]()
-        self._encoder.telemetry.begin()
-        turn = now.mono
+        parts, scans = self._events(), list[bytes]()
         for topic in self._changed(is_whole=is_whole):
-            self._add(topic, parts, moves, scans)
-            if self._clock().mono - turn >= TURN_S:
-                await asyncio.sleep(0)
-                turn = self._clock().mono
-        payload = b'%b"at":%b,"parts":[%b],"moves":[%b],"scans":[%b]}' % (
+            self._versions[topic] = self._hub.versions[topic]
+            if topics.find(topic)[0] is topics.SCAN:
+                scans += self._scan(topic)
+            else:
+                parts += self._part(topic)
+            await asyncio.sleep(0)
+        payload = b'%b"at":%b,"parts":[%b],"scans":[%b]}' % (
             WHOLE if is_whole else CHANGED,
             orjson.dumps(self._clock().mono),
-            *(b",".join(one) for one in (parts, moves, scans)),
+            b",".join(parts),
+            b",".join(scans),
         )
         is_taken = self._write(payload, now)
         if not is_taken:
@@ -120,54 +110,47 @@ class PictureRecorder:
         seen = self._versions
         return [one for one, version in versions.items() if seen.get(one) != version]
 
-    def _rest(self, now: Instant) -> list[bytes]:
-        """Lines of the log and orders, which have no version."""
+    def _events(self) -> list[bytes]:
+        """New lines of the log, and orders where they have changed."""
         parts = []
-        lines = self._views.log_since(self._log_id)
-        if lines:
+        if lines := self._views.log_since(self._log_id):
             self._log_id = lines[-1].id
-            parts.append(_part(topics.LOG.name, write_json(lines), now))
-        commands = write_json(self._views.open_commands(now))
+            parts.append(self._written(topics.LOG.name, lines))
+        commands = self._views.open_commands(self._clock())
         if commands != self._commands:
             self._commands = commands
-            parts.append(_part(_COMMANDS, commands, now))
+            parts.append(self._written(_COMMANDS, commands))
         return parts
 
-    def _add(
-        self, topic: str, parts: list[bytes], moves: list[bytes], scans: list[bytes]
-    ) -> None:
-        """Add what pages are sent of a topic, as far as it has changed."""
-        since, now = self._versions.get(topic, -1), self._clock()
-        self._versions[topic] = self._hub.versions[topic]
-        (row, key), telemetry = topics.find(topic), self._encoder.telemetry
-        if row is topics.SCAN:
-            scan = telemetry.part(topic, now)
-            if scan is not None:
-                ranges = b64encode(scan.body)
-                scans.append(b'%b,"ranges":"%b"}' % (scan.head[:-1], ranges))
-            return
+    def _part(self, topic: str) -> Iterable[bytes]:
+        """A topic's newest value; nothing of a topic without one."""
+        now = self._clock()
+        data: object = None
+        row, key = topics.find(topic)
         if row is topics.ROBOT:
-            part = telemetry.state(key, since, now, STATE_S)
-            self._versions[topic] = since if part is None else part.version
-            move = telemetry.move(key, now)
-            if move is not None and move.head != self._moves.get(key):
-                self._moves[key] = move.head
-                moves.append(move.head)
-        elif row is topics.PEOPLE:
-            part = telemetry.people(since, now, telemetry.lists_apart_s)
-            self._versions[topic] = since if part is None else part.version
+            data = self._views.robot(key, now)
         elif row is topics.DETECTIONS:
-            part = telemetry.part(topic, now)
-        else:
-            frame = self._encoder.frame(topic)
-            parts += [] if frame is None else [frame]
-            return
-        parts += [] if part is None else [part.head]
+            data = self._views.frame(key, now)
+        elif row is topics.PEOPLE:
+            data = self._people(now)
+        elif row.read is not None:
+            data = row.read(self._views, now)
+        return [] if data is None else [self._written(topic, data)]
 
+    def _people(self, now: Instant) -> dict[str, Any]:
+        people = [one.model_dump(mode="json") for one in self._views.people(now)]
+        return {
+            "ids": [one["person_id"] for one in people],
+            "changed": [{**one, "at": now.mono} for one in people],
+        }
 
-def _part(topic: str, data: bytes, now: Instant) -> bytes:
-    head = b'{"topic":%b,"at":%b,"data":%b}'
-    return head % (orjson.dumps(topic), orjson.dumps(now.mono), data)
+    def _scan(self, topic: str) -> Iterable[bytes]:
+        part = self._encoder.telemetry.part(topic, self._clock())
+        if part is not None:
+            yield b'%b,"ranges":"%b"}' % (part.head[:-1], b64encode(part.body))
+
+    def _written(self, topic: str, data: object) -> bytes:
+        return write_json({"topic": topic, "at": self._clock().mono, "data": data})
 
 
 class Past:
@@ -180,41 +163,32 @@ class Past:
     def __init__(self, files: PictureFiles) -> None:
         self._files = files
         self._turn = asyncio.Lock()
-        self._waiting = 0
 
     async def world(self, wall: float) -> bytes:
         """The world at a moment (Unix s), as JSON (``PastWorld``).
 
         Raises:
             NotRecordedError: there is no picture of it.
-            HopError: the disk refuses, or too many ask at once.
+            HopError: the disk refuses.
         """
-        if self._waiting >= MOST_WAITING:
-            raise HopError("past", "too much is asked at once")
-        self._waiting += 1
-        try:
-            async with self._turn:
-                return await asyncio.to_thread(self._world, wall)
-        finally:
-            self._waiting -= 1
+        async with self._turn:
+            return await asyncio.to_thread(self._world, wall)
 
     def _world(self, wall: float) -> bytes:
         pictures = self._files.by(wall)
         world = World()
         for payload in pictures.payloads:
             world.take(orjson.loads(payload))
-        told = {
-            "at": format_stamp(pictures.at),
-            "at_s": pictures.at,
-            "recorded_twice": pictures.is_twice,
-        }
-        return orjson.dumps({**world.members(), **told})
+        at = {"at": format_stamp(pictures.at), "at_s": pictures.at}
+        return orjson.dumps({**world.members(), **at})
 
 
 class World:
-    """What a page knows, as pictures bring it up to date.
+    """State of a page, as pictures bring it up to date.
 
     Every value is kept with its moment on the monotonic clock of its server (s).
+    Earlier versions wrote only what had changed of a robot and of people, and poses by
+    themselves.
     """
 
     def __init__(self) -> None:
@@ -282,7 +256,7 @@ class World:
         move = self._moves.get(robot_id)
         if move is None:
             still = dict.fromkeys(("pose", "twist", "stamp", "age_s"))
-            return {**robot, **still}
+            return {**still, **robot}
         _, at, age_s, x, y, yaw, linear, angular, stamp = move
         motion = {
             "pose": {"x": x, "y": y, "yaw": yaw},
@@ -297,7 +271,7 @@ class World:
 
 
 def _older(value: Any, by: float) -> Any:
-    """The same value when all of its ages are greater by so much (s)."""
+    """A value when all of its ages are greater by so much (s)."""
     if isinstance(value, list):
         return [_older(one, by) for one in value]
     if not isinstance(value, dict):

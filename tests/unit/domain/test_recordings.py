@@ -13,7 +13,7 @@ DAYS = [
 
 
 def names(limits: RecordingLimits, files: list[RecordingFile] = DAYS) -> list[str]:
-    return [one.name[:13] for one in superfluous(reversed(files), limits)]
+    return sorted(one.name[:13] for one in superfluous(reversed(files), limits))
 
 
 def test_days_without_a_recording_do_not_count() -> None:

@@ -11,6 +11,7 @@ import httpx
 import uvicorn
 
 from iveg.adapters.recordings.pictures import PictureFiles
+from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.domain.equipment import Tile
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
@@ -30,7 +31,6 @@ from iveg.web.security.roles import Role
 from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
 from tests.fakes.accounts import FakeBook, FakePasswords
-from tests.fakes.recordings import FakeRecordings
 from tests.fakes.worker import FakeWorker
 from tests.unit.vital.desk import FIELD, Desk
 from tests.unit.web.when_asked import RoutesWhenAsked
@@ -54,7 +54,7 @@ class WebDesk(Desk):
         robots: tuple[str, ...] = ("AGI", "AGII"),
         greenhouse: Greenhouse = FIELD,
         tiles: Sequence[Tile] = (),
-        pictures: Path = Path("nowhere"),
+        recordings: Path = Path("nowhere"),
     ) -> None:
         super().__init__(robots, greenhouse, tiles=tiles)
         self.heard: list[Instant] = []
@@ -86,7 +86,7 @@ class WebDesk(Desk):
                 lambda *_: None,
             ),
         )
-        self.recordings = FakeRecordings()
+        self.recordings = InputRecorder(recordings, self.clock)
         self.face = WebParts(
             pipeline=self.parts,
             views=self.views,
@@ -98,7 +98,7 @@ class WebDesk(Desk):
             worker=FakeWorker(),
             recordings=self.recordings,
             trail=self.trail,
-            past=Past(PictureFiles(pictures)),
+            past=Past(PictureFiles(self.recordings.pictures)),
             encoder=self.encoder,
             accounts=lambda: "ok",
         )

@@ -91,7 +91,7 @@ def whole_server(folder: Path) -> Iterator[WholeServer]:
     lay_history(url)
     chosen = Settings(api_token=API_TOKEN)
     fleet = load_fleet(chosen.fleet, chosen.robots)
-    real = open_outside(chosen, folder, fleet)
+    real = open_outside(chosen, folder)
     recorder = _Recorder(url, folder)
     parts = {one.name: getattr(real, one.name) for one in fields(real)}
     parts["stores"] = replace(real.stores, recorder=recorder)

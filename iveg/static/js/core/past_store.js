@@ -25,11 +25,6 @@ export class PastStore {
     return this.#shown?.left_out ?? [];
   }
 
-  /** Whether the moment came twice, as the server's clock was set back. */
-  get isTwice() {
-    return this.#shown?.recorded_twice === true;
-  }
-
   /** @param {PastWorld} world */
   take(world) {
     const before = this.#shown;

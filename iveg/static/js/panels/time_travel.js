@@ -115,15 +115,12 @@ export function createTimeTravel(app, askedS) {
     const waitedMs = question.waitedMs;
     const wait = waitSaid(waitedMs, world.isShown);
     const waited = wait && i18n.t("past.waited", { seconds: (waitedMs ?? 0) / 1000 });
-    const trust = [
-      world.isTwice && i18n.t("past.twice"),
-      world.leftOut.length > 0 &&
-        i18n.t("past.left_out", { topics: world.leftOut.join(", ") }),
-    ].filter(Boolean);
+    const topics = world.leftOut.join(", ");
+    const trust = topics && i18n.t("past.left_out", { topics });
     setText(need("[data-part=waited]", bar), waited);
     setText(
       need("[data-part=said]", bar),
-      wait ? i18n.t(`past.${wait}`) : problem || trust.join(" "),
+      wait ? i18n.t(`past.${wait}`) : problem || trust,
     );
     setAttribute(bar, "data-problem", String(problem !== "" || wait === "slow"));
     const helps = wait === "slow" || (!wait && problem !== "" && isTransient);

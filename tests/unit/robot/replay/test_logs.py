@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iveg.adapters.recordings.incoming import NOTIFICATIONS
-from iveg.adapters.recordings.mcap_file import Channel, McapFile
+from iveg.adapters.recordings.mcap_file import NOTIFICATIONS, Channel, McapFile
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import DetectionFrame, LaserScan, Odometry
@@ -232,7 +231,7 @@ def test_what_this_iveg_cannot_read_is_told_as_that(path: Path) -> None:
 def test_one_that_breaks_off_says_so_after_what_can_be_read(path: Path) -> None:
     file = McapFile(path, START)
     file.add(OWN_ODOM, at(0.0), pose(1.0, 1))
-    file.settle()
+    file.flush()
     left = path.read_bytes()
     file.finish()
     path.write_bytes(left)

@@ -14,7 +14,6 @@ from mcap.reader import make_reader
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Store
 from iveg.adapters.recordings.recorder import InputRecorder
-from iveg.adapters.recordings.writer import WriterSetup
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import LogEvent
 from iveg.domain.observations import Instant
@@ -29,7 +28,6 @@ from iveg.web.security.requirements import require
 from iveg.web.security.roles import Principal
 from tests.databases import lay_history
 from tests.fakes.clock import FakeClock
-from tests.fakes.recordings import WriterInPlace
 from tests.fakes.records import (
     NOON,
     alert_record,
@@ -51,9 +49,7 @@ class Desk:
         url = f"sqlite:///{folder / 'history.db'}"
         lay_history(url)
         self.store, self.queries = Store(url), Queries(url)
-        setup = WriterSetup(folder / "recordings")
-        self.recorder = InputRecorder(setup, FakeClock())
-        self.in_place = WriterInPlace(setup)
+        self.recorder = InputRecorder(folder / "recordings", FakeClock())
         self.lines: list[LogEvent] = []
         now = FakeClock()
         now.now = 3600.0
@@ -93,7 +89,7 @@ class Desk:
         for n in range(1200):
             at = Instant(1000.0 + n / 10, NOON + n / 10)
             self.recorder.measure(ODOM, b'{"n":%d}' % n, at)
-        self.in_place.write(self.recorder, 1120.0)
+        await self.recorder.write()
 
     def log(self, event: LogEvent, at: Instant) -> None:
         """A line of the log, in the history at once."""
@@ -103,7 +99,7 @@ class Desk:
         self.store.write([Waiting(row, 1, 0.0)])
 
     async def close(self) -> None:
-        self.in_place.writer.finish()
+        await self.recorder.close()
         self.queries.close()
         self.store.close()
 

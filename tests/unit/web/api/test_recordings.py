@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from iveg.adapters.recordings.directory import RecordingDirectory
 from iveg.web.api.past import MEDIA_TYPE
 from tests.unit.web.desk import WebDesk
 
@@ -10,8 +9,7 @@ from tests.unit.web.desk import WebDesk
 async def test_recordings_are_listed_and_sent_when_they_are_finished(
     tmp_path: Path,
 ) -> None:
-    desk = WebDesk()
-    desk.recordings.directory = RecordingDirectory(tmp_path)
+    desk = WebDesk(recordings=tmp_path)
     (tmp_path / "2026-11-24T10-00-00Z.mcap").write_bytes(b"whole")
     (tmp_path / "2026-11-24T11-00-00Z.mcap.open").write_bytes(b"half")
     (tmp_path / "rules.jsonl").write_bytes(b"not a recording")
