@@ -60,7 +60,7 @@ class Stores:
 
     def history_state(self) -> HopState:
         """State of the history."""
-        return self.recorder.health(clock.now()).state
+        return self.recorder.state(clock.now())
 
     def retained(self) -> RecordedHistory:
         """The history as its upkeep sees it."""

@@ -16,7 +16,7 @@ import asyncio
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -173,25 +173,9 @@ def _is_fault_of_row(error: Exception, engine: Engine) -> bool:
 
 _BATCH = 500
 _GATHER_S = 0.25
+"""A batch of so long is worth its commit."""
+_RETRY_S = 2.0
 _LATE_S = 2.0
-_FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 5.0
-
-
-@dataclass(frozen=True, slots=True)
-class RecorderHealth:
-    """Health of the recorder.
-
-    Attributes:
-        state: ``ok``, ``late`` (something waits longer than 2 s) or ``down``.
-        age_s: How long the oldest record has waited to be stored (s).
-        detail: Why the database is away; empty when it is not.
-        counters: written, dropped, rejected, waiting.
-    """
-
-    state: Literal["ok", "late", "down"]
-    age_s: float
-    detail: str
-    counters: Mapping[str, int]
 
 
 class Recorder:
@@ -211,58 +195,47 @@ class Recorder:
         capacity: int = CAPACITY,
         read_clock: Callable[[], Instant] = clock.now,
     ) -> None:
+        self.flushed = journal.flushed
         self._store = Store(database_url)
         self._journal = journal
         self._clock = read_clock
         self._queue = RecordQueue(capacity)
         self._thread = ThreadPoolExecutor(1, "history")
-        self._left: set[int] = set()
-        """Revisions of rows of earlier runs that are not written yet."""
-        self._awake, self._full = asyncio.Event(), asyncio.Event()
-        self._caught_up = asyncio.Event()
-        self._writing: asyncio.Task[None] | None = None
-        self._revision = 0
-        self._written = self._lost_at_close = 0
+        self._awake, self._caught_up = asyncio.Event(), asyncio.Event()
+        self._writing: asyncio.Task[bool] | None = None
+        self._written = self._revision = 0
         self._lost_since: float | None = None
-        self._lost_before = 0
-        self._detail = ""
-        self._pause_s = _FIRST_PAUSE_S
-        self.flushed = journal.flushed
-        # What an earlier run could not store goes first.
-        self._awake.set()
 
     # --- what the pipeline calls --------------------------------------------------
 
     def enqueue(self, record: Record) -> None:
         """Queue a record; never blocks, never awaits, never fails."""
-        waiting = self._stamp(record)
+        now = self._clock()
+        # The wall clock orders states across restarts, the count within one run.
+        self._revision = max(self._revision + 1, int(now.wall * 1e9))
+        waiting = Waiting(record, self._revision, now.mono)
         if is_order(record):
             self._journal.note(waiting)
         self._queue.enqueue(waiting)
         self._awake.set()
-        if len(self._queue) >= _BATCH:
-            self._full.set()
 
     async def caught_up(self) -> None:
         """Return when the database has what earlier runs left in the journal."""
         await self._caught_up.wait()
 
-    def health(self, now: Instant) -> RecorderHealth:
-        """The recorder's health at this moment."""
-        oldest = self._queue.oldest_since()
-        age = 0.0 if oldest is None else max(0.0, now.mono - oldest)
+    def state(self, now: Instant) -> Literal["ok", "late", "down"]:
+        """Whether rows reach the database, at least within 2 s."""
         if self._lost_since is not None:
-            age = max(age, now.mono - self._lost_since)
-            return RecorderHealth("down", age, self._detail, self.counters)
-        state: Literal["ok", "late"] = "late" if age > _LATE_S else "ok"
-        return RecorderHealth(state, age, "", self.counters)
+            return "down"
+        oldest = self._queue.oldest_since()
+        return "late" if oldest is not None and now.mono - oldest > _LATE_S else "ok"
 
     @property
     def counters(self) -> Mapping[str, int]:
         """Rows since the start, and rows that wait now."""
         return {
             "history_written": self._written,
-            "history_dropped": self._queue.dropped + self._lost_at_close,
+            "history_dropped": self._queue.dropped,
             "history_rejected": self._store.rejected,
             "history_waiting": len(self._queue),
         }
@@ -284,106 +257,59 @@ class Recorder:
     async def run(self) -> None:
         """Write until cancelled; call ``close`` afterwards."""
         now = self._clock().mono
-        left = [replace(one, since=now) for one in self._journal.left()]
-        self._left = {one.revision for one in left}
-        self._queue.put_back(left)
+        self._queue.put_back([replace(one, since=now) for one in self._journal.left()])
         while True:
-            await self._gather()
-            await self._round()
+            self._awake.clear()
+            batch = self._queue.dequeue(_BATCH)
+            self._writing = asyncio.create_task(
+                self._write(batch), name="history-batch"
+            )
+            # Cancelling us must not lose sight of a batch that the thread still writes.
+            if not await asyncio.shield(self._writing):
+                await asyncio.sleep(_RETRY_S)
+            elif not len(self._queue):
+                await self._awake.wait()
+                await asyncio.sleep(_GATHER_S)
 
     async def close(self) -> None:
         """Store the rest, and close the database; orders stay in the journal."""
         if self._writing is not None:
             await asyncio.wait({self._writing})
         while len(self._queue) and self._lost_since is None:
-            await self._write_batch(self._queue.dequeue(_BATCH))
+            await self._write(self._queue.dequeue(_BATCH))
         await self.flushed()
         rest = self._queue.dequeue(len(self._queue))
-        self._lost_at_close = sum(not is_order(one.record) for one in rest)
-        if self._lost_at_close:
-            _log.warning("history: %d rows were not stored", self._lost_at_close)
-        await asyncio.get_running_loop().run_in_executor(
-            self._thread, self._store.close
-        )
+        if lost := sum(not is_order(one.record) for one in rest):
+            self._queue.dropped += lost
+            _log.warning("history: %d rows were not stored", lost)
+        loop = asyncio.get_running_loop()
+        await loop.run_in_executor(self._thread, self._store.close)
         self._thread.shutdown(wait=False)
 
-    async def _gather(self) -> None:
-        """Wait for work, then a moment longer so that a batch is worth its commit."""
-        await self._awake.wait()
-        self._awake.clear()
-        try:
-            await asyncio.wait_for(self._full.wait(), _GATHER_S)
-        except TimeoutError:
-            return
-        finally:
-            self._full.clear()
-
-    async def _round(self) -> None:
-        batch = self._queue.dequeue(_BATCH)
-        self._writing = asyncio.create_task(
-            self._write_batch(batch), name="history-batch"
-        )
-        # Cancelling us must not lose sight of a batch that the thread still writes.
-        await asyncio.wait({self._writing})
-        if self._lost_since is not None:
-            pause = self._pause_s
-            self._pause_s = min(_LONGEST_PAUSE_S, 2 * pause)
-            await asyncio.sleep(pause)
-        if len(self._queue):
-            self._awake.set()
-        if len(self._queue) >= _BATCH:
-            self._full.set()
-
-    async def _write_batch(self, batch: list[Waiting]) -> None:
+    async def _write(self, batch: list[Waiting]) -> bool:
+        """Store a batch, or put it back; whether it is stored."""
         loop = asyncio.get_running_loop()
         try:
             await loop.run_in_executor(self._thread, self._store.write, batch)
-        except (HopError, DataFileError) as error:
-            self._lose(str(error))
         except Exception as error:
             # Whatever memory stumbles over, it must not take the STOP along.
-            _log.exception("history: an error of our own")
-            self._lose(repr(error))
-        else:
-            self._written += len(batch)
-            self._left.difference_update(one.revision for one in batch)
-            if not self._left:
-                self._caught_up.set()
-            self._come_back()
-            orders = {one.revision for one in batch if is_order(one.record)}
-            if orders:
-                await self._journal.committed(orders)
-            return
-        self._queue.put_back(batch)
-
-    # --- away and back ------------------------------------------------------------
-
-    def _lose(self, detail: str) -> None:
-        if self._lost_since is None:
-            self._lost_since = self._clock().mono
-            self._lost_before = self._queue.dropped
-            _log.warning("history: database lost: %s", detail)
-        self._detail = detail
-
-    def _come_back(self) -> None:
+            if not isinstance(error, HopError | DataFileError):
+                _log.exception("history: an error of our own")
+            if self._lost_since is None:
+                self._lost_since = self._clock().mono
+                _log.warning("history: database lost: %s", error)
+            self._queue.put_back(batch)
+            return False
         if self._lost_since is not None:
             away = self._clock().mono - self._lost_since
-            dropped = self._queue.dropped - self._lost_before
-            _log.info(
-                "history: database is back after %.1f s, %d rows were dropped",
-                away,
-                dropped,
-            )
-        self._lost_since, self._detail = None, ""
-        self._pause_s = _FIRST_PAUSE_S
-
-    # --- the queue ----------------------------------------------------------------
-
-    def _stamp(self, record: Record) -> Waiting:
-        now = self._clock()
-        # The wall clock orders states across restarts, the count within one run.
-        self._revision = max(self._revision + 1, int(now.wall * 1e9))
-        return Waiting(record, self._revision, now.mono)
+            _log.info("history: database is back after %.1f s", away)
+            self._lost_since = None
+        self._written += len(batch)
+        if orders := {one.revision for one in batch if is_order(one.record)}:
+            await self._journal.committed(orders)
+        if not self._journal.left():
+            self._caught_up.set()
+        return True
 
 
 def spilled_file(database_url: str, directory: Path) -> Path:

@@ -127,7 +127,7 @@ def test_the_climate_page_shows_what_the_greenhouse_measures_and_remembers_it(
     )
     expect(page.locator("#climate-sentence")).to_contain_text("al día")
     until(lambda: _is_drawn(page), "the day of the air is drawn")
-    expect(page.locator("#trend-note")).to_contain_text("una por minuto")
+    expect(page.locator("#trend-note")).to_contain_text("media de 5 min")
     # Its age begins anew with each reading, every ten seconds.
     age = page.locator("#climate-co2-age")
     expect(age).to_have_text(re.compile(r"^hace [4-9] s$"))

@@ -83,9 +83,7 @@ function createDay(i18n) {
 
   /** @param {import("./history/charts.js").Figure} figure */
   function noteOf({ data: [line] }) {
-    const { slice_s } = line.meta;
-    const minutes = slice_s / 60;
-    return i18n.t(`climate.note.${slice_s ? "sliced" : "exact"}`, { minutes });
+    return i18n.t("climate.note", { minutes: line.meta.slice_s / 60 });
   }
 
   /** @param {Part} part @param {import("./history/charts.js").Figure} figure */
