@@ -12,7 +12,6 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from iveg.adapters.mqtt import BrokerAddress
-from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.observations import LaserScan
 from iveg.domain.peer_scan import peer_scan_of
@@ -76,10 +75,8 @@ def _apart(one: float, other: float) -> float:
 
 def hear(one: LaserScan, pose: Pose2D) -> FleetCostmap:
     costmap = FleetCostmap("AGI", BODY, ROOM)
-    costmap.note(Feedback("AGII", origin()))
     told = replace(peer_scan_of(one, pose, 0.1), origin=origin())
-    costmap.hear(TOPIC, codec.write_peer_scan(told), FAR_OFF)
-    assert not costmap.refused
+    costmap.hear(TOPIC, codec.write_peer_scan(told), FAR_OFF, None)
     return costmap
 
 
@@ -102,7 +99,9 @@ def test_nothing_is_free_that_the_senders_scan_does_not_say_is_free(
 ) -> None:
     pose = Pose2D(0.4, -0.3, yaw)
     costmap = hear(one, pose)
-    found = costmap.draw(costmap.drain_scans(), (), FAR_OFF, 0.0)
+    waiting = costmap.drain_scans()
+    assert len(waiting) == 1
+    found = costmap.draw(waiting, (), FAR_OFF, 0.0)
 
     laser = pose.compose(one.mount)
     free = np.argwhere(found.data == 0)
@@ -150,7 +149,7 @@ def test_whatever_a_peers_scan_says_no_factor_changes(
     node: RobotNode, payloads: list[bytes]
 ) -> None:
     costmap = FleetCostmap("AGI", BODY, ROOM)
-    node.hear_peer_scans(lambda topic, one: costmap.hear(topic, one, FAR_OFF))
+    node.hear_peer_scans(lambda topic, one: costmap.hear(topic, one, FAR_OFF, None))
     before = node.speed_factor, node.state, node.holds
 
     for payload in payloads:
