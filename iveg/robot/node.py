@@ -146,9 +146,6 @@ class RobotNode:
         self._on_peer_scan: Callable[[str, bytes], None] | None = None
         self._asks_for_scans = False
         self._faults: tuple[RobotFault, ...] = ()
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._broken: asyncio.Future[None] | None = None
-        self._next_tick: asyncio.TimerHandle | None = None
         self._commanded: tuple[Twist2D, float] = REST, 0.0
         self._goals = RobotGoals(robot_id, navigate)
         self._placed: tuple[Pose2D | None, float] = None, 0.0
@@ -247,16 +244,13 @@ class RobotNode:
         try:
             async with asyncio.TaskGroup() as tasks:
                 for name, work in (
-                    ("gate", self._tick_forever()),
+                    ("gate", every(_GATE_EVERY_S, self._tick)),
                     ("link", self._link.run()),
                     ("keep", self._lane.keep_forever()),
                     ("send", self._lane.send_forever()),
                 ):
                     tasks.create_task(work, name=f"robot-{self._id}-{name}")
         finally:
-            self._loop = None
-            if self._next_tick is not None:
-                self._next_tick.cancel()
             self._drive(REST)
 
     def sense(self, *observations: Observation) -> None:
@@ -313,28 +307,9 @@ class RobotNode:
         now = self._read_clock().mono
         self._perform(self._machine.release_locally(now), now)
 
-    async def _tick_forever(self) -> None:
-        """Tick whenever the drive got no command for 40 ms."""
-        self._loop = asyncio.get_running_loop()
-        self._broken = self._loop.create_future()
-        self._tick()
-        await self._broken
-
-    def _tick(self) -> None:
-        self._put_off_tick()
-        try:
-            now = self._read_clock().mono
-            self._perform(self._machine.tick(now), now)
-        except Exception as error:  # ends ``run``, wherever it was called
-            if self._broken is not None and not self._broken.done():
-                self._broken.set_exception(error)
-
-    def _put_off_tick(self) -> None:
-        if self._loop is None:
-            return
-        if self._next_tick is not None:
-            self._next_tick.cancel()
-        self._next_tick = self._loop.call_later(_GATE_EVERY_S, self._tick)
+    def _tick(self, _: float) -> None:
+        now = self._read_clock().mono
+        self._perform(self._machine.tick(now), now)
 
     def _on_message(self, topic: str, payload: bytes) -> None:
         now = self._read_clock().mono
@@ -345,7 +320,7 @@ class RobotNode:
             else:
                 # First what the machine knows by now: the link may have just been lost.
                 self._perform(self._machine.tick(now), now)
-                self._tell_goal(self._goals.answer(order, self._facts(now)))
+                self._answer(*self._goals.answer(order, self._facts(now)))
         elif topic == self._desired_topic:
             self._perform(self._machine.desired(payload, now), now)
         elif self._on_peer_scan is not None and topic.endswith(names.PEER_SCAN_END):
@@ -381,7 +356,7 @@ class RobotNode:
                 case Report(report, is_measure):
                     self._report(report, is_measure=is_measure)
         if self._goals.goal is not None:
-            self._tell_goal(self._goals.settle(self._facts(now)))
+            self._answer(*self._goals.settle(self._facts(now)))
 
     def _facts(self, now: float) -> Facts:
         pose, at = self._placed
@@ -393,27 +368,20 @@ class RobotNode:
             self._machine.stands(now),
         )
 
-    def _tell_goal(self, answers: list[GoalAnswer]) -> None:
-        for answer in answers:
-            slots = self._id, answer.id, answer.result, answer.why or ""
-            _log.info("%s: goal %s %s %s", *slots)
-            own = self._own(self._read_clock())
-            self._lane.answer(self._uplink.goal_answer(answer, own))
-
     def _command_drive(self, twist: Twist2D, now: float) -> None:
         """Send zero and changes at once; do not repeat a command just sent."""
         commanded, at = self._commanded
         if twist == commanded and twist != REST and now - at < _SAID_WITHIN_S:
             return
         self._commanded = twist, now
-        self._put_off_tick()
         self._drive(twist)
 
-    def _answer(self, answer: CommandAnswer) -> None:
-        _log.info(
-            "%s: %s %s %s", self._id, answer.result, answer.id or "", answer.why or ""
-        )
-        self._lane.answer(self._uplink.answer(answer, self._own(self._read_clock())))
+    def _answer(self, *answers: CommandAnswer | GoalAnswer) -> None:
+        for answer in answers:
+            words = self._id, answer.result, answer.id or "", answer.why or ""
+            _log.info("%s: %s %s %s", *words)
+            own = self._own(self._read_clock())
+            self._lane.answer(self._uplink.answer(answer, own))
 
     def _report(self, report: SafetyReport, *, is_measure: bool) -> None:
         now, wish = self._read_clock(), self._asks_for_scans

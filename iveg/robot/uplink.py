@@ -352,15 +352,10 @@ class Uplink:
             messages.append((self._topic(_SAFETY), payload))
         return origin.seq or 0, messages
 
-    def answer(self, answer: CommandAnswer, at: Instant) -> LaneMessage:
+    def answer(self, answer: CommandAnswer | GoalAnswer, at: Instant) -> LaneMessage:
         """The message of an answer on ``cmdexe``."""
-        origin = self._origins.next(_ANSWERS, at)
-        topic = names.answer_topic(self._apikey, self._id)
-        return topic, codec.write_answer(replace(answer, origin=origin))
-
-    def goal_answer(self, answer: GoalAnswer, at: Instant) -> LaneMessage:
-        """The message of a word on a goal on ``cmdexe``."""
-        origin = self._origins.next(_GOALS, at)
+        count = _GOALS if isinstance(answer, GoalAnswer) else _ANSWERS
+        origin = self._origins.next(count, at)
         topic = names.answer_topic(self._apikey, self._id)
         return topic, codec.write_answer(replace(answer, origin=origin))
 

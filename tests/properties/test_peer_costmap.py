@@ -76,7 +76,7 @@ def _apart(one: float, other: float) -> float:
 def hear(one: LaserScan, pose: Pose2D) -> FleetCostmap:
     costmap = FleetCostmap("AGI", BODY, ROOM)
     told = replace(peer_scan_of(one, pose, 0.1), origin=origin())
-    costmap.hear(TOPIC, codec.write_peer_scan(told), FAR_OFF, told.origin.stamp_s)
+    costmap.hear(TOPIC, codec.write_peer_scan(told), FAR_OFF, None)
     return costmap
 
 
@@ -99,7 +99,9 @@ def test_nothing_is_free_that_the_senders_scan_does_not_say_is_free(
 ) -> None:
     pose = Pose2D(0.4, -0.3, yaw)
     costmap = hear(one, pose)
-    found = costmap.draw(costmap.drain_scans(), (), FAR_OFF, 0.0)
+    waiting = costmap.drain_scans()
+    assert len(waiting) == 1
+    found = costmap.draw(waiting, (), FAR_OFF, 0.0)
 
     laser = pose.compose(one.mount)
     free = np.argwhere(found.data == 0)

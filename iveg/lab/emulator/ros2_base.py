@@ -3,9 +3,7 @@
 import asyncio
 import logging
 import math
-from collections.abc import Callable
-from functools import partial
-from typing import TypeVar
+from typing import Any
 
 from iveg.adapters import clock
 from iveg.domain.errors import UnreadableError
@@ -16,9 +14,9 @@ from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.world import EmulatedSensors, RobotHardware, SimulatedWorld
 from iveg.robot.node import LONGEST_STEP_S, SLOTS, every, in_slots
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.outputs import Network, Reader, Writer
+from iveg.robot.ros2.outputs import Network, Reader
 from iveg.robot.ros2.reading import read_twist, write_twist
-from iveg.robot.ros2.topics import ROS_SENSORS
+from iveg.robot.ros2.topics import ROS_SENSORS, TOPICS
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as ros
 from iveg.ros2.messages import Message
@@ -27,35 +25,22 @@ TIMEOUT_S = 0.5
 """A base without a command for this long halts (s)."""
 
 
-_GIVES_UP_S, _RESTS_S = 1.0, 0.8
-T = TypeVar("T")
+_TRIES_S, _RESTS_S = 1.0, 0.8
 
 
-class SimulatedNavigation:
-    """Nav2 as a gate meets it: requests twists, gives up without progress, tries again.
+def wished_twist(requested: Twist2D, driven: Twist2D, now: float) -> Twist2D:
+    """Twist of a navigation, which gives up now and then while the base rests.
 
     After a resume the gate stays closed until zero was requested; a real navigation
     without progress cancels its goal and requests zero.
+
+    Args:
+        requested: The twist that leads on.
+        driven: Last command of the base.
+        now: Monotonic (s).
     """
-
-    def __init__(self) -> None:
-        self._stuck_since: float | None = None
-        self._rests_until = -math.inf
-
-    def requested_twist(
-        self, requested: Twist2D, driven: Twist2D, now: float
-    ) -> Twist2D:
-        """The twist requested now; ``driven`` was the last command of the base."""
-        if now < self._rests_until:
-            return REST
-        if requested == REST or driven != REST:
-            self._stuck_since = None
-        elif self._stuck_since is None:
-            self._stuck_since = now
-        elif now - self._stuck_since > _GIVES_UP_S:
-            self._stuck_since, self._rests_until = None, now + _RESTS_S
-            return REST
-        return requested
+    gives_up = driven == REST and now % (_TRIES_S + _RESTS_S) > _TRIES_S
+    return REST if gives_up else requested
 
 
 class DriveWatchdog:
@@ -76,6 +61,10 @@ class DriveWatchdog:
 _log = logging.getLogger(__name__)
 _SECOND = 1.0
 _LASER = "laser"
+_PUBLISHED = (
+    *("odometry", "scan", "detections_3d", "path"),
+    *("tf", "tf_static", "cmd_vel_in"),
+)
 
 
 class Ros2Base:
@@ -105,41 +94,31 @@ class Ros2Base:
         self._rig, self._world = rig, world
         self._frames = config.frames
         self._rate_hz = rate_hz
-        self._base, self._navigation = DriveWatchdog(), SimulatedNavigation()
+        self._base = DriveWatchdog()
         self._odom_in_map = rig.vehicle.pose
         self._run_began = 0.0
         names = config.full_topics
-
-        def writer(topic: str, message: type[Message]) -> Writer:
-            return network.writer(names[topic], message, config.quality(topic))
-
-        self._commands = network.reader(
-            names["cmd_vel_out"],
-            ros.Twist,
-            config.quality("cmd_vel_out").newest(50),
-        )
-        self._goals = network.reader(
-            names["goal"], ros.PoseStamped, config.quality("goal").newest()
-        )
-        self._wishes = writer("cmd_vel_in", ros.Twist)
-        self._tf, self._tf_static = (
-            writer("tf", ros.TFMessage),
-            writer("tf_static", ros.TFMessage),
-        )
-        self._odometry = writer("odometry", ros.Odometry)
-        self._scans = writer("scan", ros.LaserScan)
-        self._seen = writer("detections_3d", ros.Detection3DArray)
-        self._paths = writer("path", ros.Path)
-        self._sensors = EmulatedSensors()
-        self._readings = {
-            sensor.of: (sensor, writer(name, sensor.message))
-            for name, sensor in ROS_SENSORS.items()
+        self._writers = {
+            topic: network.writer(
+                names[topic], TOPICS[topic].message, config.quality(topic)
+            )
+            for topic in (*_PUBLISHED, *ROS_SENSORS)
         }
+        self._commands, self._goals = (
+            network.reader(
+                names[topic], TOPICS[topic].message, config.quality(topic).newest()
+            )
+            for topic in ("cmd_vel_out", "goal")
+        )
+        self._sensors = EmulatedSensors()
+
+    def _publish(self, topic: str, message: Message) -> None:
+        self._writers[topic].write(cdr.write(message))
 
     async def run(self, began: float, phase: float) -> None:
         """Drive and sense until cancelled; ``began`` is when the run began."""
         self._run_began = began
-        self._tf_static.write(cdr.write(self._mounts()))
+        self._publish("tf_static", self._mounts())
         self.started.set()
         await asyncio.sleep(phase)
         async with asyncio.TaskGroup() as tasks:
@@ -155,33 +134,33 @@ class Ros2Base:
 
     def _drive(self, dt: float) -> None:
         now = clock.now()
-        self._read_commands(now.mono)
+        self._read_command(now.mono)
         self._read_goal()
         command = self._base.command(now.mono)
         self._rig.drive(command)
         requested = self._rig.requested_twist(now.mono - self._run_began, self._world)
-        asked = self._navigation.requested_twist(requested, command, now.mono)
-        self._wishes.write(cdr.write(write_twist(asked)))
+        wished = wished_twist(requested, command, now.mono)
+        self._publish("cmd_vel_in", write_twist(wished))
         self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
         self._tell_place(ros.Time.of(now.wall))
 
-    def _read_commands(self, now: float) -> None:
-        twist = self._newest(self._commands, _read_twist)
+    def _read_command(self, now: float) -> None:
+        twist = self._newest(self._commands, ros.Twist)
         if twist is not None:
-            self._base.replace_command(twist, now)
+            self._base.replace_command(read_twist(twist), now)
 
     def _read_goal(self) -> None:
         """Take the newest goal; one without a way is left, as Nav2 aborts it."""
-        goal = self._newest(self._goals, partial(cdr.read, ros.PoseStamped))
+        goal = self._newest(self._goals, ros.PoseStamped)
         if goal is not None:
             place = goal.pose.position
             self._rig.pursue(Goal("", "here", place.x, place.y), self._world)
 
-    def _newest(self, reader: Reader, read: Callable[[bytes], T]) -> T | None:
+    def _newest(self, reader: Reader, form: type[Message]) -> Any:
         """The newest message of a topic; None for none, or one that is unusable."""
         waited = reader.take()
         try:
-            return read(waited[-1]) if waited else None
+            return cdr.read(form, waited[-1]) if waited else None
         except UnreadableError as error:
             _log.warning("%s: unusable message: %s", self.robot_id, error)
             return None
@@ -200,8 +179,8 @@ class Ros2Base:
             _link(stamp, frames.map, frames.odom, self._odom_in_map),
             _link(stamp, frames.odom, frames.base_link, in_odom),
         )
-        self._tf.write(cdr.write(ros.TFMessage(links)))
-        self._odometry.write(cdr.write(odometry))
+        self._publish("tf", ros.TFMessage(links))
+        self._publish("odometry", odometry)
 
     def _scan(self, _: float) -> None:
         sweep = self._rig.scan(self._world)
@@ -216,14 +195,14 @@ class Ros2Base:
             sweep.range_max,
             sweep.ranges,
         )
-        self._scans.write(cdr.write(message))
+        self._publish("scan", message)
 
     def _look(self, _: float) -> None:
         now = clock.now()
         frame = self._rig.detect(now.mono - self._run_began, self._world)
         header = ros.Header(ros.Time.of(now.wall), self._frames.base_link)
-        seen = tuple(_detection(one, header) for one in frame.detections)
-        self._seen.write(cdr.write(ros.Detection3DArray(header, seen)))
+        seen = tuple(_detection(found, header) for found in frame.detections)
+        self._publish("detections_3d", ros.Detection3DArray(header, seen))
 
     def _tell_slowly(self, _: float) -> None:
         header = ros.Header(ros.Time.of(clock.wall()), self._frames.map)
@@ -231,20 +210,16 @@ class Ros2Base:
         poses = tuple(
             ros.PoseStamped(header, _pose(Pose2D(x, y, 0.0))) for x, y in path
         )
-        self._paths.write(cdr.write(ros.Path(header, poses)))
+        self._publish("path", ros.Path(header, poses))
         for reading in self._sensors.due(clock.mono() - self._run_began):
-            if type(reading) in self._readings:
-                sensor, out = self._readings[type(reading)]
-                out.write(cdr.write(sensor.write(header, reading)))
+            for name, sensor in ROS_SENSORS.items():
+                if isinstance(reading, sensor.of):
+                    self._publish(name, sensor.write(header, reading))
 
     def _mounts(self) -> ros.TFMessage:
         stamp = ros.Time.of(clock.wall())
         laser = self._rig.profile.laser
         return ros.TFMessage((_link(stamp, self._frames.base_link, _LASER, laser),))
-
-
-def _read_twist(raw: bytes) -> Twist2D:
-    return read_twist(cdr.read(ros.Twist, raw))
 
 
 def _relative(outer: Pose2D, pose: Pose2D) -> Pose2D:
