@@ -305,7 +305,7 @@ class BrokerClient(asyncio.Protocol):
             raise ValueError(kind)
 
     def _connect(self, kind: int, body: bytes) -> None:
-        """Admit a client; on loopback a dead one closes, so keep-alive is not watched."""
+        # Keep-alive is not watched: on loopback a connection ends with its process.
         if kind != _CONNECT or body[2:7] != _MQTT_3_1_1 or body[7] & _WILL:
             raise ValueError(kind)
         client_id, _ = _field(body, 10)
