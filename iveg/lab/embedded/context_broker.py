@@ -145,8 +145,7 @@ class ContextBroker:
         changed = entity.apply(changes, scope.now)
         for subscription in self.tenant(scope.service).subscriptions.values():
             if subscription.wants(entity, changed, scope.now):
-                subscription.sent_at = scope.now
-                self.outbox.post(subscription, entity)
+                self.outbox.post(subscription, entity, scope.now)
 
     # --- updates that may have to be passed on ----------------------------------
 
@@ -398,7 +397,9 @@ async def _create_subscription(call: _Call) -> Response:
 
 
 async def _change_subscription(call: _Call) -> Response:
-    _subscription(call).change(load_object(call.body))
+    subscription = _subscription(call)
+    subscription.change(load_object(call.body))
+    call.broker.outbox.forget(subscription.id)
     return Response(status_code=204)
 
 

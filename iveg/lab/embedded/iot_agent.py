@@ -31,7 +31,6 @@ from iveg.lab.embedded.entities import (
     load_object,
     looks_clean,
     new_id,
-    not_supported,
     read_date,
     write_date,
 )
@@ -40,7 +39,8 @@ from iveg.lab.embedded.mqtt_broker import MqttBroker
 # --- groups and devices -----------------------------------------------------------
 
 _Read = TypeVar("_Read", bound="_Provisioned")
-_NotDone = list[object]
+_NONE_YET = Field([], max_length=0)
+"""What the embedded agent cannot do is refused, not ignored."""
 
 
 def _wrong_syntax() -> FiwareError:
@@ -80,9 +80,9 @@ class _Provisioned(BaseModel):
     service: str
     entity_type: str
     attributes: list[DeviceAttribute] = []
-    lazy: _NotDone = Field([], max_length=0)
+    lazy: list[object] = _NONE_YET
     commands: list[DeviceCommand] = []
-    static_attributes: _NotDone = Field([], max_length=0)
+    static_attributes: list[object] = _NONE_YET
 
 
 class Group(_Provisioned):
@@ -139,9 +139,6 @@ def _read(kind: type[_Read], raw: Mapping[str, Any]) -> _Read:
     try:
         return kind.model_validate(raw)
     except ValidationError as error:
-        for fault in error.errors():
-            if fault["type"] == "too_long":
-                raise not_supported(str(fault["loc"][0])) from error
         raise _wrong_syntax() from error
 
 

@@ -8,7 +8,6 @@ second.
 """
 
 import asyncio
-import logging
 import re
 from collections.abc import Mapping, Set
 from typing import Annotated, Any, Literal
@@ -159,6 +158,14 @@ class Subscription:
         self.sent_at = float("-inf")
         self._raw = raw
 
+    @property
+    def receiver(self) -> Endpoint:
+        """Where its notifications go."""
+        notification = self.document.notification
+        found = notification.http or notification.http_custom
+        assert found is not None  # noqa: S101 - checked by the model
+        return found
+
     def wants(self, entity: Entity, changed: Set[str], now: float) -> bool:
         """Whether a change of these attributes is to be notified.
 
@@ -171,6 +178,17 @@ class Subscription:
             and self.document.status == "active"
             and self.path == entity.path
             and any(subscribed.matches(entity) for subscribed in subject.entities)
+        )
+
+    def notification_of(self, entity: Entity, now: float) -> bytes:
+        """Body of a notification that is about to be sent."""
+        notification = self.document.notification
+        view = EntityView(notification.attrs, notification.attrs_format == "keyValues")
+        self.sent += 1
+        self.sent_at = now
+        return b'{"subscriptionId":"%b","data":[%b]}' % (
+            self.id.encode(),
+            write_entity(entity, view),
         )
 
     def change(self, raw: Mapping[str, Any]) -> None:
@@ -197,11 +215,10 @@ class Subscription:
             "failsCounter": self.fails,
             "lastFailureReason": self.failure,
         }
-        shown["notification"] |= {key: what for key, what in counters.items() if what}
+        shown["notification"] |= {key: fact for key, fact in counters.items() if fact}
         return {"id": self.id, **shown}
 
 
-_log = logging.getLogger(__name__)
 MOST_WAITING = 300
 """Capacity of one lane: ten seconds of one kind of a robot's measures at 30 Hz."""
 IDLE_S = 2.0
@@ -221,24 +238,18 @@ class Outbox:
     def __init__(self) -> None:
         self._lanes: dict[str, dict[object, Lane]] = {}
 
-    def post(self, subscription: Subscription, entity: Entity) -> None:
+    def post(self, subscription: Subscription, entity: Entity, now: float) -> None:
         """Send one entity to one subscriber."""
         lanes = self._lanes.setdefault(subscription.id, {})
-        lane = lanes.get(entity.key)
-        if lane is None or lane.document is not subscription.document:
-            if lane is not None:
-                lane.close()
-            lane = lanes[entity.key] = Lane(subscription)
-        notification = subscription.document.notification
-        view = EntityView(notification.attrs, notification.attrs_format == "keyValues")
-        subscription.sent += 1
-        lane.send(
-            b'{"subscriptionId":"%b","data":[%b]}'
-            % (subscription.id.encode(), write_entity(entity, view))
-        )
+        if entity.key not in lanes:
+            lanes[entity.key] = Lane(subscription)
+        lanes[entity.key].send(subscription.notification_of(entity, now))
 
     def forget(self, subscription_id: str) -> None:
-        """Close the connections of a subscription; what waits is lost."""
+        """Close the connections of a subscription that changed or is deleted.
+
+        What waits is lost.
+        """
         for lane in self._lanes.pop(subscription_id, {}).values():
             lane.close()
 
@@ -253,18 +264,13 @@ class Lane:
 
     Args:
         subscription: Records how each of its notifications ends.
-
-    Attributes:
-        document: The version of the subscription that it serves.
     """
 
     def __init__(self, subscription: Subscription) -> None:
-        self.document = subscription.document
-        self._receiver = _receiver_of(self.document)
+        self._receiver = subscription.receiver
         self._head = _write_head(subscription)
         self._subscription = subscription
         self._waiting: asyncio.Queue[bytes] = asyncio.Queue(MOST_WAITING)
-        self._is_overflowing = False
         self._streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = None
         self._loop = asyncio.get_running_loop()
         self._used_at = self._loop.time()
@@ -275,9 +281,6 @@ class Lane:
         if self._waiting.full():
             self._waiting.get_nowait()
             self._subscription.ended(TIMED_OUT)
-            if not self._is_overflowing:
-                _log.warning("%s reads too slowly: oldest dropped", self._receiver.url)
-                self._is_overflowing = True
         self._waiting.put_nowait(body)
 
     def close(self) -> None:
@@ -301,9 +304,6 @@ class Lane:
             if failure:
                 self._hang_up()
             self._subscription.ended(failure)
-            if self._is_overflowing and self._waiting.empty():
-                _log.warning("%s has caught up", self._receiver.url)
-                self._is_overflowing = False
 
     async def _exchange(self, body: bytes) -> None:
         """Send one notification and read the response, whatever its status.
@@ -320,8 +320,8 @@ class Lane:
             raise ValueError(head)
         length = _LENGTH.search(head)
         await reader.readexactly(int(length[1]) if length else 0)
-        is_whole = length is not None or head.startswith(b"http/1.1 204")
-        if not is_whole or b"connection: close" in head or b"http/1.0" in head:
+        is_kept = length is not None or head.startswith(b"http/1.1 204")
+        if not is_kept or b"connection: close" in head or b"http/1.0" in head:
             self._hang_up()
         self._used_at = self._loop.time()
 
@@ -344,16 +344,9 @@ class Lane:
             self._streams = None
 
 
-def _receiver_of(document: SubscriptionDocument) -> Endpoint:
-    notification = document.notification
-    found = notification.http or notification.http_custom
-    assert found is not None  # noqa: S101 - checked by the model
-    return found
-
-
 def _write_head(subscription: Subscription) -> bytes:
     """The part of a request's head that does not change; no header is empty."""
-    receiver = _receiver_of(subscription.document)
+    receiver = subscription.receiver
     url = urlsplit(receiver.url)
     headers = {
         "host": url.netloc,

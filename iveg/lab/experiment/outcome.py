@@ -105,7 +105,6 @@ def counted_of(run: VirtualRecording) -> Outcome:
     """Result of the virtual half, which is reproducible."""
     truth = map(picture_of_truth, run.truth)
     return {
-        "completed": run.completed,
         "pictures": len(run.reported),
         "classes": tally(zip(truth, run.reported, strict=True)),
         "slowdowns": slowdowns_of(run.decisions),
@@ -159,7 +158,7 @@ def result_of(
         },
         "configuration": dict(chosen),
         "planned": sum(step.is_timed for step in plan.steps()),
-        "completed": {"counted": _completed(counted), "timed": _completed(timed)},
+        "completed": sum(half["completed"] for half in timed),
         "detection": {name: _scored([name], counted) for name in CLASSES},
         "global": _scored(CLASSES, counted),
         "slowdowns": _sum(half["slowdowns"] for half in counted),
@@ -173,10 +172,6 @@ def result_of(
 def timed_runs(result: Json) -> list[Outcome]:
     """Its runs of the paper's scenarios, which have both halves."""
     return [run for run in result["runs"] if run["timed"] is not None]
-
-
-def _completed(halves: Sequence[Outcome]) -> int:
-    return sum(half["completed"] for half in halves)
 
 
 def _protected(plan: ExperimentPlan, outcomes: Sequence[Outcome]) -> Json | None:
@@ -254,11 +249,10 @@ def write_raw(
     _write_rows(directory / "decisions.ndjson", virtual.decisions)
     kept = ("family", "number", "seed", "profile", "rule")
     document: dict[str, object] = {name: outcome[name] for name in kept}
-    document["completed"] = {"virtual": virtual.completed}
     if real is not None:
         _write_rows(directory / "messages.ndjson", real.times)
         document |= {
-            "completed": {"virtual": virtual.completed, "real": real.completed},
+            "completed": real.completed,
             "measured": {"began": real.began, "ended": real.ended},
         }
     write_json(directory / "run.json", document)

@@ -2,14 +2,13 @@
 
 It looks from outside: where robots and people really are, what a camera really has in
 view, how fast a robot may drive by its own safety machine.  What iVeg believed, decided
-or told does not count, except for when it told of an encounter.
+or published does not count, except for when it published an encounter.
 
 *Near* is within two metres of a robot that moves; an *encounter* is one robot near one
 person in view of some camera, without a pause of a second; its *delay* is the time
 from there until the robot is limited to half speed.  An *entry* is a zone that a robot
-reaches, or is reached by, around somebody who has been in view for two seconds, who has
-stepped into view since, which leaves nobody the time to slow before, or who is in no
-camera's view.
+reaches, or is reached by, around somebody who has been in view for two seconds; later
+glimpses leave nobody the time to slow before.
 
 A person is in view where the newest picture of some robot has them, if it is not older
 than a quarter of a second: robots take theirs at different times.
@@ -22,7 +21,7 @@ from itertools import groupby
 from math import dist, inf
 from operator import attrgetter, itemgetter
 from statistics import quantiles
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.records import Json
@@ -31,18 +30,15 @@ from iveg.lab.experiment.stage import Row
 Sight = Literal["in_view", "behind_plants", "unseen"]
 """In view of some camera; hidden from the robot that is near; neither."""
 SIGHTS: Final[tuple[Sight, ...]] = ("in_view", "behind_plants", "unseen")
-Known = Literal["in_view", "stepped_out", "unseen"]
-"""In view for two seconds, for less, not at all."""
-KNOWN: Final[tuple[Known, ...]] = ("in_view", "stepped_out", "unseen")
 NEAR_M = 2.0
 """The zone of the rule (m)."""
-AWAY_M = (2.3, 4.0)
-"""Slowed with nobody so near is needless: at the zone, and far away (m)."""
+AWAY_M = 4.0
+"""Slowed with nobody so near is needless (m)."""
 MOVES_M_S = 0.05
 SLOW_SHARE = 0.55
 """Share of the speed that a robot wants: half, and what noise adds."""
 AHEAD_S = 1.5
-"""So long before its entry an encounter should be told (s)."""
+"""So long before its entry an encounter should be published (s)."""
 ROUNDING_S = 1e-6
 
 
@@ -52,7 +48,7 @@ class NearPerson:
 
     Attributes:
         distance_m: From the robot's ``base_link`` to the person.
-        foretold: iVeg tells an encounter of this robot with the person.
+        foretold: iVeg publishes an encounter of this robot with the person.
     """
 
     name: str
@@ -89,29 +85,23 @@ class NearMoment:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A robot and a person came within two metres.
+    """A robot and a person in view came within two metres.
 
     Attributes:
         speed_share: Of its wanted speed that the robot drove.
-        foretold_s: For how long iVeg had told of it (s); None: it had not.
-        known: How well cameras had the person in view.
+        foretold_s: For how long iVeg had published it (s); None: it had not.
     """
 
     speed_share: float
     foretold_s: float | None
-    known: Known
 
     @property
     def is_foretold(self) -> bool:
-        """Whether iVeg told of it long enough before."""
+        """Whether iVeg published it long enough before."""
         return (self.foretold_s or 0.0) >= AHEAD_S - ROUNDING_S
 
 
-def _metres(distance: float) -> str:
-    return f"{distance:g}"
-
-
-def _seconds() -> defaultdict[Any, float]:
+def _seconds() -> defaultdict[Sight, float]:
     return defaultdict(float)
 
 
@@ -120,56 +110,40 @@ class Protection:
     """Sums over a run, or over several.
 
     Attributes:
-        driven_s: Robots moved; ``driven_m`` so far.
+        driven_s: Robots moved.
         near_s: Person-seconds near a moving robot, by ``Sight``; ``slowed_s`` of them
             while it was limited.
-        needless_s: A moving robot was limited with nobody within so many metres.
+        needless_s: A moving robot was limited with nobody near at all.
         delays_s: Of each encounter; None: the robot was never limited.
         entries: Each as ``Entry`` has it.
     """
 
     driven_s: float = 0.0
-    driven_m: float = 0.0
+    needless_s: float = 0.0
     near_s: defaultdict[Sight, float] = field(default_factory=_seconds)
     slowed_s: defaultdict[Sight, float] = field(default_factory=_seconds)
-    needless_s: defaultdict[str, float] = field(default_factory=_seconds)
     delays_s: list[float | None] = field(default_factory=list)
     entries: list[Entry] = field(default_factory=list)
 
     def row(self) -> Json:
         """The numbers by name; None where there was nothing to count."""
         near, slowed = sum(self.near_s.values()), sum(self.slowed_s.values())
-        delays = [one for one in self.delays_s if one is not None]
+        by_sight = {
+            sight: share(self.slowed_s[sight], self.near_s[sight]) for sight in SIGHTS
+        }
+        foretold = sum(entry.is_foretold for entry in self.entries)
+        slow = sum(entry.speed_share <= SLOW_SHARE for entry in self.entries)
         return {
-            "near_s": {one: round(self.near_s[one], 2) for one in SIGHTS},
-            "slowed": {
-                **{one: share(self.slowed_s[one], self.near_s[one]) for one in SIGHTS},
-                "all": share(slowed, near),
-            },
+            "near_s": {sight: round(self.near_s[sight], 2) for sight in SIGHTS},
+            "slowed": {**by_sight, "all": share(slowed, near)},
             "encounters": len(self.delays_s),
             "never_slowed": self.delays_s.count(None),
-            "delay_p50_s": _quantile(delays, 50),
-            "delay_p95_s": _quantile(delays, 95),
-            "needless": {
-                away_m: share(self.needless_s[away_m], self.driven_s)
-                for away_m in map(_metres, AWAY_M)
-            },
-            "driven_m": round(self.driven_m, 1),
-            "entries": {
-                known: _entered([one for one in self.entries if one.known == known])
-                for known in KNOWN
-            },
+            "delay_p95_s": _p95([s for s in self.delays_s if s is not None]),
+            "needless": share(self.needless_s, self.driven_s),
+            "entries": len(self.entries),
+            "foretold": share(foretold, len(self.entries)),
+            "entered_slow": share(slow, len(self.entries)),
         }
-
-
-def _entered(entries: list[Entry]) -> Json:
-    foretold = sum(one.is_foretold for one in entries)
-    slow = sum(one.speed_share <= SLOW_SHARE for one in entries)
-    return {
-        "count": len(entries),
-        "foretold": share(foretold, len(entries)),
-        "slow": share(slow, len(entries)),
-    }
 
 
 def total_of(runs: Iterable[Protection]) -> Protection:
@@ -177,11 +151,10 @@ def total_of(runs: Iterable[Protection]) -> Protection:
     total = Protection()
     for run in runs:
         total.driven_s += run.driven_s
-        total.driven_m += run.driven_m
-        for name in ("near_s", "slowed_s", "needless_s"):
-            sums = getattr(total, name)
-            for key, spent_s in getattr(run, name).items():
-                sums[key] += spent_s
+        total.needless_s += run.needless_s
+        for sight in SIGHTS:
+            total.near_s[sight] += run.near_s[sight]
+            total.slowed_s[sight] += run.slowed_s[sight]
         total.delays_s += run.delays_s
         total.entries += run.entries
     return total
@@ -192,10 +165,10 @@ def share(part: float, whole: float) -> float | None:
     return None if whole == 0.0 else round(part / whole, 4)
 
 
-def _quantile(values: list[float], percent: int) -> float | None:
+def _p95(values: list[float]) -> float | None:
     if len(values) < 2:
         return values[0] if values else None
-    return round(quantiles(values, n=100, method="inclusive")[percent - 1], 3)
+    return round(quantiles(values, n=20, method="inclusive")[-1], 3)
 
 
 _STILL_S: Final = 0.25
@@ -211,16 +184,16 @@ def moments_of(
 
     Args:
         truth: Rows of the truth.
-        encounters: With people, as iVeg told them: ``robot``, ``at``, ``people``
+        encounters: With people, as iVeg published them: ``robot``, ``at``, ``people``
             (each the place ``x``, ``y`` where iVeg has somebody), at the same times.
     """
-    people_at = {(one["robot"], one["at"]): one["people"] for one in encounters}
+    people_at = {(row["robot"], row["at"]): row["people"] for row in encounters}
     newest: dict[str, Row] = {}
     for at, same in groupby(sorted(truth, key=itemgetter("at")), itemgetter("at")):
         rows, before = list(same), dict(newest)
         newest.update({row["robot"]: row for row in rows})
         young = (row for row in newest.values() if at - row["at"] <= _STILL_S)
-        in_view = {one["key"] for row in young for one in row["visible"]}
+        in_view = {target["key"] for row in young for target in row["visible"]}
         for row in rows:
             places = people_at.get((row["robot"], at), ())
             last_at = before.get(row["robot"], row)["at"]
@@ -236,19 +209,21 @@ def moments_of(
 
 
 def _people(row: Row, in_view: set[str], places: Sequence[Row]) -> Iterator[NearPerson]:
-    foretold = {person_at(row["people"], one["x"], one["y"]) for one in places}
+    foretold = {person_at(row["people"], place["x"], place["y"]) for place in places}
     here = row["pose"]["x"], row["pose"]["y"]
-    for one in row["people"]:
-        key = one["key"]
-        sight: Sight = "behind_plants" if one["hidden"] else "unseen"
+    for person in row["people"]:
+        key, there = person["key"], (person["x"], person["y"])
+        sight: Sight = "behind_plants" if person["hidden"] else "unseen"
         if key in in_view:
             sight = "in_view"
-        yield NearPerson(key, dist(here, (one["x"], one["y"])), sight, key in foretold)
+        yield NearPerson(key, dist(here, there), sight, key in foretold)
 
 
 def person_at(people: Iterable[Row], x: float, y: float) -> str | None:
     """Person who really is at a place (m), by the truth's keys; None: nobody."""
-    away = {one["key"]: dist((one["x"], one["y"]), (x, y)) for one in people}
+    away = {
+        person["key"]: dist((person["x"], person["y"]), (x, y)) for person in people
+    }
     nearest = min(away, key=lambda key: away[key], default=None)
     return nearest if nearest is not None and away[nearest] <= _SAME_M else None
 
@@ -283,11 +258,9 @@ def protection_of(moments: Iterable[NearMoment]) -> Protection:
 
 def _add_driving(sums: Protection, moment: NearMoment) -> None:
     sums.driven_s += moment.lasts_s
-    sums.driven_m += moment.speed * moment.lasts_s
     nearest = min((person.distance_m for person in moment.people), default=inf)
-    for away_m in AWAY_M:
-        if moment.is_slowed and nearest > away_m:
-            sums.needless_s[_metres(away_m)] += moment.lasts_s
+    if moment.is_slowed and nearest > AWAY_M:
+        sums.needless_s += moment.lasts_s
 
 
 @dataclass(slots=True)
@@ -305,14 +278,14 @@ class _Pair:
 
     Attributes:
         seen_since: Since when in view without a break (s); None: not in view.
-        told_since: Since when iVeg tells of them, without a break of a second (s);
-            ``told_at`` when it did last.
+        foretold_since: Since when iVeg publishes an encounter with them, without a
+            break of a second (s); ``foretold_at`` when it did last.
         is_outside: Whether the zone's edge lay between them.
     """
 
     seen_since: float | None = None
-    told_since: float = -inf
-    told_at: float = -inf
+    foretold_since: float = -inf
+    foretold_at: float = -inf
     is_outside: bool = False
     encounters: list[_Encounter] = field(default_factory=list)
 
@@ -342,18 +315,15 @@ def _note_entry(
         pair.seen_since = None
     elif pair.seen_since is None:
         pair.seen_since = at
-    is_outside = person.distance_m > NEAR_M
-    if pair.is_outside and not is_outside and moment.wanted > MOVES_M_S:
-        known: Known = "unseen"
-        if pair.seen_since is not None:
-            is_long = at - pair.seen_since >= _IN_VIEW_S - ROUNDING_S
-            known = "in_view" if is_long else "stepped_out"
-        is_told = at - pair.told_at <= _PAUSE_S
-        foretold_s = round(at - pair.told_since, 3) if is_told else None
-        speed_share = round(moment.speed / moment.wanted, 4)
-        sums.entries.append(Entry(speed_share, foretold_s, known))
-    pair.is_outside = is_outside
+    in_view_s = 0.0 if pair.seen_since is None else at - pair.seen_since
+    is_known = in_view_s >= _IN_VIEW_S - ROUNDING_S
+    enters = pair.is_outside and person.distance_m <= NEAR_M
+    if enters and is_known and moment.wanted > MOVES_M_S:
+        is_foretold = at - pair.foretold_at <= _PAUSE_S
+        foretold_s = round(at - pair.foretold_since, 3) if is_foretold else None
+        sums.entries.append(Entry(round(moment.speed / moment.wanted, 4), foretold_s))
+    pair.is_outside = person.distance_m > NEAR_M
     if person.foretold:
-        if at - pair.told_at > _PAUSE_S:
-            pair.told_since = at
-        pair.told_at = at
+        if at - pair.foretold_at > _PAUSE_S:
+            pair.foretold_since = at
+        pair.foretold_at = at

@@ -85,7 +85,7 @@ def conclusions(result: Result) -> Iterator[str]:
     if result["protected"] is not None:
         yield _protection(result["protected"])
     if runs := len(timed_runs(result)):
-        yield _completion(result["completed"]["timed"], runs)
+        yield _completion(result["completed"], runs)
         yield _slow_downs(result["slowdowns"])
     if (farmer := result["detection"]["farmer"])["recall"] is not None:
         yield from _detection(farmer)

@@ -42,18 +42,16 @@ class VirtualRecording:
 
     Attributes:
         truth: The emulator's rows, one a picture (``emulator.world.true_picture``).
-        reported: What iVeg told of each of these pictures.
-        foretold: Encounters with people as iVeg told them at each picture
+        reported: Detections of each of these pictures, as iVeg shows them.
+        foretold: Encounters with people as iVeg published them at each picture
             (``protection.moments_of``).
         decisions: Each with ``reason``, ``applied_at``, ``observed_at``, ``in_sight``.
-        completed: Whether it reached its end with all robots live.
     """
 
     truth: list[Row] = field(default_factory=list)
     reported: list[Picture] = field(default_factory=list)
     foretold: list[Row] = field(default_factory=list)
     decisions: list[Row] = field(default_factory=list)
-    completed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -342,12 +340,9 @@ class VirtualRun:
             self._report()
             if number % _REST_EVERY == 0:
                 await asyncio.sleep(0)
-        result, robots = self._result, self._iveg.parts.core.world.robots
-        result.decisions = [asdict(one) for one in self._iveg.decisions.values()]
-        result.completed = bool(result.reported) and all(
-            robots[one].link(self._iveg.now) == "LIVE" for one in ROBOTS
-        )
-        return result
+        decisions = self._iveg.decisions.values()
+        self._result.decisions = [asdict(decision) for decision in decisions]
+        return self._result
 
     def _looked(self, rig: RobotHardware) -> None:
         """The truth at the moment of the picture."""

@@ -63,21 +63,21 @@ async def test_poison_is_survived_in_silence(
 
 
 @pytest.mark.parametrize(
-    ("part", "status"),
+    "part",
     [
-        ({"attributes": [1]}, "400"),
-        ({"commands": "x"}, "400"),
-        ({"device_id": 5}, "400"),
-        ({"static_attributes": [{"name": "maker", "value": "us"}]}, "501"),
-        ({"lazy": [{"name": "color"}]}, "501"),
+        {"attributes": [1]},
+        {"commands": "x"},
+        {"device_id": 5},
+        {"static_attributes": [{"name": "maker", "value": "us"}]},
+        {"lazy": [{"name": "color"}]},
     ],
 )
 async def test_a_device_of_another_shape_or_with_what_is_not_supported_is_refused(
-    up: Running, part: dict[str, object], status: str
+    up: Running, part: dict[str, object]
 ) -> None:
     entity = {"entity_name": "AGI", "entity_type": "Robot"}
     async with IotAgentClient(up.iota_url, *TENANT) as agent:
-        with pytest.raises(HopError, match=status):
+        with pytest.raises(HopError, match="400"):
             await agent.create_device(
                 {"device_id": "D", "apikey": "iveg", **entity, **part}
             )
