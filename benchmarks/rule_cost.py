@@ -102,11 +102,10 @@ class Kept:
 
     def __init__(self) -> None:
         self.all: list[Feedback | Record] = []
-        self._writer = codec.FeedbackWriter()
 
     def publish_feedback(self, feedback: Feedback) -> None:
         """Write one feedback, and keep it."""
-        self._writer.write(feedback)
+        codec.write_feedback(feedback)
         self.all.append(feedback)
 
     def publish_peer_scan(self, scan: PeerScan) -> None:

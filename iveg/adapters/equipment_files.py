@@ -11,6 +11,7 @@ from pydantic import (
 
 from iveg.adapters.toml_files import Table, complaint, read_table, read_text
 from iveg.domain.equipment import UNITS, Limit, Tile, contradiction
+from iveg.domain.fleet import is_robot_id
 from iveg.ngsi import names
 
 DEMO = "demo"
@@ -71,7 +72,7 @@ def _known_unit(text: str) -> str:
 
 
 def _free_device(text: str) -> str:
-    if not names.is_robot_id(text):
+    if not is_robot_id(text):
         raise ValueError("must be 1 to 64 letters, digits and hyphens, and not iVeg's")
     return text
 
