@@ -39,7 +39,7 @@ from iveg.domain.peer_scan import PeerScan
 from iveg.domain.records import Record
 from iveg.domain.transports import FIWARE
 from iveg.ngsi import codec
-from iveg.pipeline import Choices, build
+from iveg.pipeline import Choices, Pipeline
 from iveg.vital.evaluate import Evaluator
 from iveg.vital.ports import Ports
 from tests.fakes.journal import FakeJournal
@@ -102,11 +102,10 @@ class Kept:
 
     def __init__(self) -> None:
         self.all: list[Feedback | Record] = []
-        self._writer = codec.FeedbackWriter()
 
     def publish_feedback(self, feedback: Feedback) -> None:
         """Write one feedback, and keep it."""
-        self._writer.write(feedback)
+        codec.write_feedback(feedback)
         self.all.append(feedback)
 
     def publish_peer_scan(self, scan: PeerScan) -> None:
@@ -148,7 +147,7 @@ def evaluator_of(robots: tuple[str, ...], kept: Kept) -> Evaluator:
     )
     choices = Choices(FakeChoices().kept, "bench")
     fleet = load_fleet(words=robots)
-    return build(fleet, load_greenhouse("agroconnect"), ports, choices).evaluator
+    return Pipeline(fleet, load_greenhouse("agroconnect"), ports, choices).evaluator
 
 
 def cost(

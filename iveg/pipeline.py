@@ -56,29 +56,46 @@ class Choices:
     refused: Sequence[str] = ()
 
 
-@dataclass(frozen=True, slots=True)
 class Pipeline:
     """The parts, each by its name; nothing runs until ``loop.run()``.
 
-    STOP and speed limits need none from ``margins`` on.
+    STOP and speed limits need none from ``latency`` on.
     """
 
-    core: Core
-    hub: Hub
-    ingest: Ingest
-    evaluator: Evaluator
-    commander: Commander
-    loop: RuleLoop
-    rules: Rules
-    detectors: Detectors
-    things: ThingMarks
-    latency: LatencyWatch
-    goals: GoalDispatcher
-    equipment: EquipmentMonitor
-    peer_scans: PeerScans
-    mapper: Mapper
-    coverage: CoverageMonitor
-    trials: Trials
+    def __init__(
+        self,
+        fleet: FleetDescription,
+        greenhouse: Greenhouse,
+        ports: Ports,
+        choices: Choices,
+    ) -> None:
+        self.hub = Hub()
+        self.core = core = _core(fleet, greenhouse, ports, choices)
+        self.ingest = ingest = _ingest(core)
+        world, supervision, kept = core.world, core.supervision, choices.kept
+        self.evaluator = Evaluator(core, kept.rules[-1])
+        self.commander = Commander(core)
+        self.loop = RuleLoop(core, ingest, self.evaluator, self.commander)
+        self.rules = Rules(core, self.evaluator, kept)
+        self.detectors, self.things = Detectors(core, kept), ThingMarks(core)
+        self.latency = latency = LatencyWatch(world.robots, world.ledger.composed_at)
+        self.goals = goals = GoalDispatcher(core, self.commander.machines)
+        self.equipment = EquipmentMonitor(core, Equipment(choices.tiles, ports.clock()))
+        publish = ports.fleet.publish_peer_scan
+        self.peer_scans = PeerScans(world, ingest.reject, publish, choices.boot)
+        self.mapper = Mapper(world, greenhouse.bounds, ingest.reject)
+        self.coverage = CoverageMonitor(world, greenhouse)
+        supervision.listen("live", changed=self.hub.changed, appended=self.hub.append)
+        supervision.listen("goals", goal_answered=goals.take_answer, ticked=goals.tick)
+        supervision.listen(
+            "latency",
+            arrived=latency.arrived,
+            decided=latency.decided,
+            ticked=latency.tick,
+        )
+        supervision.listen("margins", ticked=NewestMargins(core).tick)
+        supervision.listen(EQUIPMENT, entity_read=self.equipment.receive)
+        self.trials = Trials(core, self.evaluator, self.rules, kept.trial)
 
     def counters(self) -> Counter[str]:
         """Everything that is counted in it."""
@@ -89,50 +106,6 @@ class Pipeline:
         total["live.browsers"] = self.hub.watchers
         total["nlos.protected"] = self.evaluator.protected_unseen
         return total
-
-
-def build(
-    fleet: FleetDescription, greenhouse: Greenhouse, ports: Ports, choices: Choices
-) -> Pipeline:
-    """All parts, wired."""
-    core, hub = _core(fleet, greenhouse, ports, choices), Hub()
-    world, supervision, kept = core.world, core.supervision, choices.kept
-    ingest, latency = (
-        _ingest(core),
-        LatencyWatch(world.robots, world.ledger.composed_at),
-    )
-    evaluator, commander = Evaluator(core, kept.rules[-1]), Commander(core)
-    rules = Rules(core, evaluator, kept)
-    goals = GoalDispatcher(core, commander.machines)
-    equipment = EquipmentMonitor(core, Equipment(choices.tiles, ports.clock()))
-    supervision.listen("live", changed=hub.changed, appended=hub.append)
-    supervision.listen("goals", goal_answered=goals.take_answer, ticked=goals.tick)
-    supervision.listen(
-        "latency",
-        arrived=latency.arrived,
-        decided=latency.decided,
-        ticked=latency.tick,
-    )
-    supervision.listen("margins", ticked=NewestMargins(core).tick)
-    supervision.listen(EQUIPMENT, entity_read=equipment.receive)
-    return Pipeline(
-        core,
-        hub,
-        ingest,
-        evaluator,
-        commander,
-        RuleLoop(core, ingest, evaluator, commander),
-        rules,
-        Detectors(core, kept),
-        ThingMarks(core),
-        latency,
-        goals,
-        equipment,
-        PeerScans(world, ingest.reject, ports.fleet.publish_peer_scan, choices.boot),
-        Mapper(world, greenhouse.bounds, ingest.reject),
-        CoverageMonitor(world, greenhouse),
-        Trials(core, evaluator, rules, kept.trial),
-    )
 
 
 def _core(

@@ -6,7 +6,6 @@ New ids: ULIDs (github.com/ulid/spec), made at each look and each judgement.
 import os
 import time
 from base64 import b32encode
-from functools import lru_cache
 
 from iveg.domain.observations import Instant
 
@@ -31,10 +30,9 @@ def now() -> Instant:
     return Instant(mono(), wall())
 
 
-_RANDOM_BYTES, _RANDOM_DIGITS = 10, 16
-_MADE_AT_ONCE = 64
+_RANDOM_BYTES = 10
 _LEFT_OUT = 6
-"""Digits of ten bytes that are always zero where six hold the time."""
+"""Digits of four zero bytes, which fill the time up to whole groups of five."""
 _CROCKFORD = bytes.maketrans(
     b"ABCDEFGHIJKLMNOPQRSTUVWXYZ234567", b"0123456789ABCDEFGHJKMNPQRSTVWXYZ"
 )
@@ -45,20 +43,6 @@ def new_id() -> str:
 
     Ids of one millisecond are in no order.
     """
-    if not _unused:
-        digits = _digits(os.urandom(_MADE_AT_ONCE * _RANDOM_BYTES))
-        starts = range(0, len(digits), _RANDOM_DIGITS)
-        _unused.extend(digits[start : start + _RANDOM_DIGITS] for start in starts)
-    return _of_moment(int(wall() * 1000)) + _unused.pop()
-
-
-_unused: list[str] = []
-
-
-@lru_cache(maxsize=1)
-def _of_moment(milliseconds: int) -> str:
-    return _digits(milliseconds.to_bytes(_RANDOM_BYTES, "big"))[_LEFT_OUT:]
-
-
-def _digits(data: bytes) -> str:
-    return b32encode(data).translate(_CROCKFORD).decode()
+    moment = int(wall() * 1000).to_bytes(_RANDOM_BYTES, "big")
+    digits = b32encode(moment + os.urandom(_RANDOM_BYTES)).translate(_CROCKFORD)
+    return digits[_LEFT_OUT:].decode()

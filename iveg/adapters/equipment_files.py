@@ -11,6 +11,7 @@ from pydantic import (
 
 from iveg.adapters.toml_files import Table, complaint, read_table, read_text
 from iveg.domain.equipment import UNITS, Limit, Tile, contradiction
+from iveg.domain.fleet import is_robot_id
 from iveg.ngsi import names
 
 DEMO = "demo"
@@ -71,7 +72,7 @@ def _known_unit(text: str) -> str:
 
 
 def _free_device(text: str) -> str:
-    if not names.is_robot_id(text):
+    if not is_robot_id(text):
         raise ValueError("must be 1 to 64 letters, digits and hyphens, and not iVeg's")
     return text
 
@@ -105,8 +106,8 @@ class _Place(Table):
 
 
 class _Tile(Table):
-    entity: Annotated[_Word, AfterValidator(_other_entity)]
-    type: Annotated[_Word, AfterValidator(_other_type)]
+    entity_id: Annotated[_Word, AfterValidator(_other_entity), Field(alias="entity")]
+    entity_type: Annotated[_Word, AfterValidator(_other_type), Field(alias="type")]
     attribute: _Word
     name: _Names
     unit: Annotated[str, AfterValidator(_known_unit)]
@@ -117,7 +118,7 @@ class _Tile(Table):
     high_high: float | None = None
     deadband: Annotated[float, Field(ge=0)] = 0.0
     silent_after_s: Annotated[float, Field(ge=1, le=604_800)] = 300.0
-    trend: bool = True
+    has_trend: Annotated[bool, Field(alias="trend")] = True
     place: _Place | None = None
     device: Annotated[str, AfterValidator(_free_device)] = ""
 
@@ -133,20 +134,9 @@ class _Tile(Table):
         return {name: one for name, one in found.items() if one is not None}
 
     def value(self) -> Tile:
-        return Tile(
-            entity_id=self.entity,
-            entity_type=self.type,
-            attribute=self.attribute,
-            name={"es": self.name.es, "en": self.name.en},
-            unit=self.unit,
-            decimals=self.decimals,
-            limits=self._limits(),
-            deadband=self.deadband,
-            silent_after_s=self.silent_after_s,
-            has_trend=self.trend,
-            place=None if self.place is None else (self.place.x, self.place.y),
-            device=self.device,
-        )
+        place = None if self.place is None else (self.place.x, self.place.y)
+        alike = self.model_dump(exclude={*_LIMITS, "place"})
+        return Tile(**alike, limits=self._limits(), place=place)
 
 
 class _FileTable(Table):

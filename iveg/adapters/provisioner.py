@@ -38,8 +38,8 @@ _ASK_PERIOD_S, _REPAIR_PERIOD_S = 1.0, 4.0
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 3.0
 _UNANSWERED_S = 30.0
 """No look at devices for so long after one that got no answer: it may be queued."""
-_DEVICES_EVERY = 3
-"""While all is well, devices are looked at every third time."""
+_DEVICES_PERIOD_S = 12.0
+"""Between two looks at devices while all is well."""
 
 
 class Provisioner:
@@ -56,8 +56,8 @@ class Provisioner:
     ) -> None:
         self._orion, self._agent, self._link = orion, agent, link
         self._health_monitor, self._ingest, self._site = health_monitor, ingest, site
-        self._probe_seq = self._rounds = 0
-        self._devices_at = 0.0
+        self._probe_seq = 0
+        self._devices_at = self._unanswered_until = 0.0
         self._broken: set[str] = set()
         self._warned: frozenset[str] = frozenset()
         self._gap = asyncio.Event()
@@ -157,7 +157,7 @@ class Provisioner:
         monitor.agent_slow = _slow(clock.now().mono - before.mono)
         if self._agent_trouble:
             monitor.agent_error = monitor.agent_silent = ""
-            self._devices_at = 0.0
+            self._unanswered_until = 0.0
             self._gap.set()
         return self._tell("iot_agent", None)
 
@@ -174,7 +174,6 @@ class Provisioner:
         """
         self._gap.clear()
         devices = self._devices_are_due(clock.now())
-        self._rounds += 1
         if self._health_monitor.orion_error:
             return False
         is_whole = True
@@ -189,10 +188,10 @@ class Provisioner:
 
     def _devices_are_due(self, now: Instant) -> bool:
         """Never while the agent falls behind: the questions would queue there too."""
-        if self._health_monitor.is_overloaded(now) or now.mono < self._devices_at:
+        monitor = self._health_monitor
+        if monitor.is_overloaded(now) or now.mono < self._unanswered_until:
             return False
-        is_turn = self._rounds % _DEVICES_EVERY == 0
-        return is_turn or not self._health_monitor.whole(now)
+        return now.mono >= self._devices_at or not monitor.whole(now)
 
     async def _try(
         self, what: str, hop: str, work: Callable[[], Awaitable[None]]
@@ -210,13 +209,14 @@ class Provisioner:
         if what == "devices":
             self._health_monitor.agent_warning = failure.detail
             if isinstance(failure, NoAnswerError):
-                self._devices_at = clock.now().mono + _UNANSWERED_S
+                self._unanswered_until = clock.now().mono + _UNANSWERED_S
         elif what == "subscriptions":
             self._health_monitor.notify_error = failure.detail
         ask = self._ask_agent if failure.hop == "iot_agent" else self._ask_orion
         return await ask() and self._tell(what, failure)
 
     async def _check_devices(self) -> None:
+        self._devices_at = clock.now().mono + _DEVICES_PERIOD_S
         done = await provision(self._agent, self._orion, self._site)
         _explain(done.mended)
         # What only a person can mend stands on the health page while it lasts.

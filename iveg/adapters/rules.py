@@ -1,8 +1,7 @@
 """The rule's versions and its trial, each in a small file of JSON lines.
 
 The settings make the first version.  A person's change outlives a restart, until the
-settings themselves change: then these are newer, and a version of their own.  A version
-in which looks did not add up yet stays as it was, and the next one has them.  A file
+settings themselves change: then these are newer, and a version of their own.  A file
 with a line that cannot be read is put aside, and the strictest rule of what is left of
 it is in force until a person makes another.  A trial that cannot be read is put aside:
 then nothing is tried, and nothing else changes.
@@ -28,8 +27,6 @@ from iveg.adapters.files import (
 from iveg.domain.comparison import Comparison
 from iveg.domain.detection_rule import (
     ALIASES,
-    RECOVERED,
-    UPGRADED,
     DetectionRule,
     strictest,
 )
@@ -65,7 +62,6 @@ class FileRules:
         """
         read, damage = self._read()
         versions = _with_settings(read or [settings], settings, now.wall)
-        versions = _with_looks(versions, now.wall)
         if damage:
             self._recover([*versions, strictest(versions, now.wall)], damage, now)
         elif len(versions) > max(1, len(read)):
@@ -149,16 +145,6 @@ def _as_set(versions: list[DetectionRule]) -> dict[str, Any]:
     return found
 
 
-def _with_looks(versions: list[DetectionRule], wall: float) -> list[DetectionRule]:
-    """The versions, and one more where looks did not add up in the last."""
-    last = versions[-1]
-    if last.possible_people:
-        return versions
-    # What was recovered stays to be checked.
-    author = RECOVERED if last.author == RECOVERED else UPGRADED
-    return [*versions, _next(last, author, wall, possible_people=True)]
-
-
 class _StoredRule(BaseModel):
     """One line of the file; a key that is missing has the rule's default."""
 
@@ -167,7 +153,7 @@ class _StoredRule(BaseModel):
     id: str = _FIRST.id
     version: int = Field(1, ge=1)
     aliases: dict[str, Class] = Field(default_factory=lambda: dict(ALIASES))
-    possible_people: bool = False
+    possible_people: bool = True
     comparison: Comparison | None = None
     author: str = _SETTINGS
     since: float | None = None
@@ -179,6 +165,8 @@ class _StoredRule(BaseModel):
             row.name: row.read(stored, row.default, row.name) for row in PARAMETERS
         }
         values |= {name: stored[name] for name in _StoredRule.model_fields}
+        # Looks always add up, also in versions of before that was so.
+        values["possible_people"] = True
         return DetectionRule(**values)
 
 

@@ -3,6 +3,7 @@
 They share nothing, so that a fault of one leaves the other alone.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from typing import Literal
 
@@ -14,18 +15,45 @@ from iveg.domain.peer_scan import PeerScan
 from iveg.ngsi import codec, names
 
 
-class MqttTransport:
-    """Straight to the robots; implements ``CommandPort`` and ``Fleet`` of the ports."""
+class _OrderTransport(ABC):
+    """Orders as commands of NGSI; implements ``vital.ports.CommandPort``."""
+
+    @abstractmethod
+    async def _order(
+        self, robot_id: str, value: Mapping[str, object], name: str = names.COMMAND
+    ) -> None:
+        """Send a command once."""
+
+    async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
+        """Send a STOP, which may be sent again."""
+        await self._order(robot_id, codec.write_stop(hold_id, by))
+
+    async def release(
+        self, robot_id: str, ids: Iterable[str], challenge: str, attempt: str
+    ) -> None:
+        """Send a release, once."""
+        await self._order(robot_id, codec.write_release(ids, challenge, attempt))
+
+    async def resume(self, robot_id: str, challenge: str, attempt: str) -> None:
+        """Send a resume, once."""
+        await self._order(robot_id, codec.write_resume(challenge, attempt))
+
+    async def goal(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
+        """Send a goal or its cancellation, once."""
+        await self._order(robot_id, codec.write_goal(order), names.GOAL)
+
+
+class MqttTransport(_OrderTransport):
+    """Straight to the robots; implements ``vital.ports.FleetPort``, too."""
 
     def __init__(self, link: MqttLink, apikey: str) -> None:
         self._link = link
         self._apikey = apikey
-        self._writer = codec.FeedbackWriter()
 
     def publish_feedback(self, feedback: Feedback) -> None:
         """Offer feedback; a newer one overtakes what has not left yet."""
         topic = names.FEEDBACK_TOPIC.format(robot_id=feedback.robot_id)
-        self._link.enqueue(topic, self._writer.write(feedback), qos=1)
+        self._link.enqueue(topic, codec.write_feedback(feedback), qos=1)
 
     def publish_peer_scan(self, scan: PeerScan) -> None:
         """Offer a scan at QoS 0; a newer one overtakes what has not left yet."""
@@ -35,20 +63,6 @@ class MqttTransport:
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
         """Publish a STOP, never retained; returns when the broker has it."""
         await self._order(robot_id, codec.write_stop(hold_id, by), qos=1)
-
-    async def release(
-        self, robot_id: str, ids: Iterable[str], challenge: str, attempt: str
-    ) -> None:
-        """Publish a release, once."""
-        await self._order(robot_id, codec.write_release(ids, challenge, attempt))
-
-    async def resume(self, robot_id: str, challenge: str, attempt: str) -> None:
-        """Publish a resume, once."""
-        await self._order(robot_id, codec.write_resume(challenge, attempt))
-
-    async def goal(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
-        """Publish a goal or its cancellation, once."""
-        await self._order(robot_id, codec.write_goal(order), names.GOAL)
 
     async def _order(
         self,
@@ -70,32 +84,13 @@ class MqttTransport:
         await self._link.publish(topic, payload, qos=1, retain=True)
 
 
-class OrionTransport:
-    """Through Orion; implements ``vital.ports.CommandPort``."""
+class OrionTransport(_OrderTransport):
+    """Through Orion, whose 204 is no evidence."""
 
     def __init__(self, orion: OrionClient) -> None:
         self._orion = orion
 
-    async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
-        """Ask for a STOP; Orion's 204 is no evidence."""
-        await self._orion.update_command(robot_id, codec.write_stop(hold_id, by))
-
-    async def release(
-        self, robot_id: str, ids: Iterable[str], challenge: str, attempt: str
+    async def _order(
+        self, robot_id: str, value: Mapping[str, object], name: str = names.COMMAND
     ) -> None:
-        """Ask for a release, once."""
-        await self._orion.update_command(
-            robot_id, codec.write_release(ids, challenge, attempt)
-        )
-
-    async def resume(self, robot_id: str, challenge: str, attempt: str) -> None:
-        """Ask for a resume, once."""
-        await self._orion.update_command(
-            robot_id, codec.write_resume(challenge, attempt)
-        )
-
-    async def goal(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
-        """Ask for a goal or its cancellation, once."""
-        await self._orion.update_command(
-            robot_id, codec.write_goal(order), name=names.GOAL
-        )
+        await self._orion.update_command(robot_id, value, name=name)

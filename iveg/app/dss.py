@@ -49,7 +49,7 @@ from iveg.domain.errors import HopError, SettingsError, VitalPartError
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.observations import Instant
 from iveg.domain.transports import DIRECT, FIWARE
-from iveg.pipeline import Choices, Pipeline, build
+from iveg.pipeline import Choices, Pipeline
 from iveg.settings import Settings
 from iveg.vital.audit import AuditTrail
 from iveg.vital.ports import Ports
@@ -108,7 +108,7 @@ class Dss:
             settings.notify_token_previous,
         )
         boot = secrets.token_hex(8)
-        self.pipeline = build(
+        self.pipeline = Pipeline(
             fleet,
             load_greenhouse(settings.greenhouse),
             self._ports(),

@@ -17,7 +17,7 @@ from iveg.domain.peer_scan import PeerScan
 from iveg.domain.records import DecisionRecord, Record
 from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec
-from iveg.pipeline import Choices, build
+from iveg.pipeline import Choices, Pipeline
 from iveg.vital.operators import Kept, KeptChoices
 from iveg.vital.ports import Ports
 
@@ -65,7 +65,7 @@ class VirtualPipeline:
             Kept({}, self.keep),
             Kept(None, self.keep),
         )
-        self.parts = build(fleet, greenhouse, ports, Choices(kept))
+        self.parts = Pipeline(fleet, greenhouse, ports, Choices(kept))
 
     def move(self, seconds: float) -> Instant:
         """Set the clock to ``seconds`` after the start."""

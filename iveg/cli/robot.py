@@ -19,9 +19,13 @@ from iveg.cli.running import (
     tune_garbage_collection,
 )
 from iveg.domain.errors import HopError, SettingsError, UnreadableError
-from iveg.domain.fleet import UNDESCRIBED_SPEED, RobotDescription, RobotProfile
+from iveg.domain.fleet import (
+    UNDESCRIBED_SPEED,
+    RobotDescription,
+    RobotProfile,
+    is_robot_id,
+)
 from iveg.domain.witness import Plan
-from iveg.ngsi import names
 from iveg.robot.ros2.checking import CheckRow, forms_published, judge, lines
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs
@@ -116,7 +120,7 @@ def _listen(
 def run(call: CommandCall) -> int:
     """Run ``iveg robot``; returns the exit code."""
     options, settings = call.options, call.settings
-    if not names.is_robot_id(options.id):
+    if not is_robot_id(options.id):
         allowed = "1 to 64 letters, digits and hyphens, and no name of iVeg's own"
         raise SettingsError("--id", options.id, allowed)
     config = load_config(options, call.environment)

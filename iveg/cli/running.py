@@ -8,7 +8,6 @@ import asyncio
 import contextlib
 import gc
 import os
-import resource
 import signal
 import socket
 import sys
@@ -21,7 +20,6 @@ import uvloop
 from iveg.settings import Settings
 
 EVERY_ADDRESS = ("0.0.0.0", "::")  # noqa: S104 - told apart, not bound
-_MOST_DESCRIPTORS = 4096
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
@@ -30,15 +28,6 @@ def run_until_stopped(
 ) -> int:
     """Run until the end or the first signal; returns the exit code."""
     return uvloop.run(_guard(work, until_eof=until_eof))
-
-
-def raise_descriptor_limit() -> None:
-    """Allow this process as many open files as it may have by itself, in reason."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = _MOST_DESCRIPTORS if hard == resource.RLIM_INFINITY else hard
-    wanted = min(wanted, _MOST_DESCRIPTORS)
-    if soft != resource.RLIM_INFINITY and soft < wanted:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
 
 
 async def _guard(work: Coroutine[object, object, None], *, until_eof: bool) -> int:

@@ -18,7 +18,6 @@ from iveg.cli.arguments import CommandCall
 from iveg.cli.running import (
     page_address,
     print_sign_in_link,
-    raise_descriptor_limit,
     report_ready,
     run_until_stopped,
     tune_garbage_collection,
@@ -77,7 +76,6 @@ async def serve(
         VitalPartError: one of its vital parts has ended.
     """
     await _upgrade_history(settings, data)
-    raise_descriptor_limit()
     dss = open_dss(settings, data, demo=demo, make=make)
     with contextlib.suppress(HopError):
         await dss.accounts.copy_earlier()

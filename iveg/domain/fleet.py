@@ -8,6 +8,7 @@ camera that can clear no spot.
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal
 
 from iveg.domain.geometry import Pose2D
@@ -130,6 +131,7 @@ NOBODY = FleetDescription()
 """A fleet of which nothing is known."""
 
 
+@lru_cache(maxsize=1024)
 def is_robot_id(text: str) -> bool:
     """Whether a robot may be called so."""
     return ROBOT_ID.fullmatch(text) is not None and text not in RESERVED_IDS

@@ -1,6 +1,5 @@
 """The fixed names of the wire: topics, attributes, devices, entities."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -56,9 +55,6 @@ PEER_SCAN_TOPIC = "/{robot_id}/iveg/peer_scan"
 PEER_SCAN_FILTER = "/+/iveg/peer_scan"
 PEER_SCAN_END = PEER_SCAN_FILTER.removeprefix("/+")
 
-_ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
-_RESERVED = frozenset({CLIMATE_DEVICE, HEARTBEAT_ID})
-
 
 @dataclass(frozen=True, slots=True)
 class RobotDevice:
@@ -92,12 +88,6 @@ ROBOT_DEVICES = (
 )
 """The command device sorts before its sensors, and is provisioned last where the agent
 keeps its registry in memory, so that either registry picks it (docs/fiware.md)."""
-
-
-@lru_cache(maxsize=1024)
-def is_robot_id(text: str) -> bool:
-    """Whether a text may name a robot."""
-    return _ROBOT_ID.fullmatch(text) is not None and text not in _RESERVED
 
 
 def measure_topic(apikey: str, device_id: str) -> str:

@@ -4,7 +4,6 @@ from urllib.parse import urlsplit
 
 from iveg.cli.arguments import CommandCall
 from iveg.cli.running import (
-    raise_descriptor_limit,
     report_ready,
     run_until_stopped,
     tune_garbage_collection,
@@ -21,7 +20,6 @@ def run(call: CommandCall) -> int:
 
 async def fiware(settings: Settings) -> None:
     """The embedded MQTT broker, Orion and IoT Agent."""
-    raise_descriptor_limit()
     tune_garbage_collection()
     await serve_fiware(
         _address(settings.mqtt_url, 1883),

@@ -5,7 +5,6 @@
 
 from iveg.domain.stamps import format_stamp, parse_stamp
 from iveg.ngsi.codec.feedback import (
-    FeedbackWriter,
     read_feedback,
     read_peer_scan,
     write_feedback,
@@ -34,7 +33,6 @@ from iveg.ngsi.codec.outgoing import (
 
 __all__ = [
     "MAX_DEPTH",
-    "FeedbackWriter",
     "ReadResult",
     "UnreadPart",
     "format_stamp",

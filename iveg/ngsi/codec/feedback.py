@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from operator import is_
 from typing import Annotated, TypeVar
 
 import numpy as np
@@ -94,57 +93,32 @@ def _of_classes(row: Parameter, value: object) -> Mapping[Class, float]:
     }
 
 
-class FeedbackWriter:
-    """Writes feedback; parts that the messages of one turn share are written once."""
-
-    def __init__(self) -> None:
-        self._shared: tuple[object, ...] = (None, None, None)
-        self._written: dict[str, object] = {}
-
-    def write(self, feedback: Feedback) -> bytes:
-        """The bytes of ``/{robot}/mqtt_feedback``."""
-        shared = feedback.alerts, feedback.speed_limits, feedback.seen
-        if not all(map(is_, shared, self._shared)):
-            self._shared = shared
-            self._written = _write_shared(feedback)
-        alert, backlog_s = feedback.alert, feedback.backlog_s
-        fields: dict[str, object] = {
-            **write_origin(feedback.origin),
-            "robot_id": feedback.robot_id,
-            "alert": None if alert is None else _fragment(_ALERT, alert),
-            "robot_pose": _write_pose(feedback),
-            **self._written,
-        }
-        if backlog_s is not None:
-            fields["backlog"] = {
-                "fiware_s": round(min(backlog_s, LONGEST_BACKLOG_S), 1)
-            }
-        if feedback.foresight:
-            fields["foresight"] = True
-        if feedback.rule:
-            fields["rule"] = feedback.rule
-        return orjson.dumps(fields)
-
-
 def write_feedback(feedback: Feedback) -> bytes:
-    """The bytes of one ``/{robot}/mqtt_feedback``."""
-    return FeedbackWriter().write(feedback)
-
-
-def _write_shared(feedback: Feedback) -> dict[str, object]:
-    """Part of the feedback that is the same for all robots.
+    """The bytes of ``/{robot}/mqtt_feedback``.
 
     Of a robot that is clear the id alone is written, or the fleet's limits would be
     most of the message; a robot that is named nowhere is unsupervised.
     """
+    alert, backlog_s = feedback.alert, feedback.backlog_s
     limits = feedback.speed_limits
     limited = {name: limit for name, limit in limits.items() if limit != CLEAR}
-    return {
+    fields: dict[str, object] = {
+        **write_origin(feedback.origin),
+        "robot_id": feedback.robot_id,
+        "alert": None if alert is None else _fragment(_ALERT, alert),
+        "robot_pose": _write_pose(feedback),
         "alerts": _fragment(_ALERTS, feedback.alerts),
         "speed_limits": _fragment(_LIMITS, limited),
         "clear": [name for name in limits if name not in limited],
         "seen": feedback.seen,
     }
+    if backlog_s is not None:
+        fields["backlog"] = {"fiware_s": round(min(backlog_s, LONGEST_BACKLOG_S), 1)}
+    if feedback.foresight:
+        fields["foresight"] = True
+    if feedback.rule:
+        fields["rule"] = feedback.rule
+    return orjson.dumps(fields)
 
 
 def _fragment(of: TypeAdapter[T], value: T) -> orjson.Fragment:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, ValidationError
 
 from iveg.domain.errors import UnreadableError
+from iveg.domain.fleet import is_robot_id
 from iveg.domain.frames import may_be_laser_frame
 from iveg.domain.kinds import KIND_OF, SENSED
 from iveg.domain.limits import LIMITS
@@ -346,7 +347,7 @@ _GOAL = _declared(GoalAnswer, names.GOAL)
 def read_measure(device_id: str, payload: bytes) -> ReadResult:
     """Read what a robot's device published on its ``attrs`` topic."""
     robot_id = names.robot_of_device(device_id)
-    if not names.is_robot_id(robot_id):
+    if not is_robot_id(robot_id):
         return unread(clean_text(device_id), "bad_robot_id")
     try:
         return read_attributes(robot_id, _load_object(payload))
@@ -423,7 +424,7 @@ def read_entity(
     }
     identity = entity_id, entity_type
     if entity_type == names.ROBOT_TYPE:
-        if not names.is_robot_id(entity_id):
+        if not is_robot_id(entity_id):
             return unread(clean_text(entity_id), "bad_robot_id")
         return read_attributes(entity_id, attributes)
     if identity == (names.CLIMATE_ID, names.CLIMATE_TYPE):

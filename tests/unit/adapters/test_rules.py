@@ -7,7 +7,7 @@ import pytest
 
 from iveg.adapters.rules import FileRules
 from iveg.domain.comparison import Comparison, Doings
-from iveg.domain.detection_rule import RECOVERED, UPGRADED, DetectionRule
+from iveg.domain.detection_rule import RECOVERED, DetectionRule
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.parameters import ByClass
 from tests.builders import START
@@ -43,28 +43,14 @@ async def test_changed_settings_are_a_newer_version(tmp_path: Path) -> None:
     assert list(FileRules(tmp_path / "rules.jsonl").load(strict, START)) == list(again)
 
 
-@pytest.mark.parametrize(
-    ("author", "next_author"), [("ana", UPGRADED), (RECOVERED, RECOVERED)]
-)
-async def test_a_version_in_which_looks_did_not_add_up_stays_and_the_next_has_them(
-    tmp_path: Path, author: str, next_author: str
-) -> None:
-    single = replace(CHANGED, possible_people=False, author=author)
+async def test_looks_add_up_in_versions_of_before_that_was_so(tmp_path: Path) -> None:
     rules = FileRules(tmp_path / "rules.jsonl")
     rules.load(FIRST, START)
-    await rules.append(single)
+    await rules.append(replace(CHANGED, possible_people=False))
 
     again = FileRules(tmp_path / "rules.jsonl").load(FIRST, START)
 
-    upgraded = replace(
-        single,
-        version=3,
-        possible_people=True,
-        comparison=None,
-        author=next_author,
-    )
-    assert list(again) == [FIRST, single, upgraded]
-    assert list(FileRules(tmp_path / "rules.jsonl").load(FIRST, START)) == list(again)
+    assert list(again) == [FIRST, CHANGED]
 
 
 def put_aside(directory: Path) -> list[str]:

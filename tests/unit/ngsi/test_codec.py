@@ -307,20 +307,6 @@ def test_devices_are_their_robots_and_no_attribute_holds_what_orion_forbids() ->
             assert not set(name) & set("<>\"'=;()")
 
 
-def test_what_robots_are_told_alike_is_written_once_and_reads_the_same() -> None:
-    alert = FeedbackAlert("d1", "t", "person", "farmer", 0.9, (1.0, 2.0, 0.9), 2.0, "A")
-    told = (alert,), {"AGI": SpeedLimit(0.5, "person", "P1", 1.0, "d1")}, {"AGI": 7}
-    writer = codec.FeedbackWriter()
-    for alerts, speed_limits, seen in (told, told, ((), {}, {"AGI": 8}), told):
-        for robot_id in ("AGI", "AGII"):
-            one = Feedback(
-                robot_id, Origin(), alerts=alerts, speed_limits=speed_limits, seen=seen
-            )
-            written = writer.write(one)
-            assert orjson.loads(written) == orjson.loads(codec.write_feedback(one))
-            assert codec.read_feedback(written) == one
-
-
 @pytest.mark.parametrize("frame", ["map", "odom", "AGII/laser", "/world"])
 def test_a_scan_in_no_frame_of_its_robot_is_refused_by_name(frame: str) -> None:
     body = b'{"lidar_points": [1.0], "lidar_header": {"angle_min": 0, '

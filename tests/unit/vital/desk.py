@@ -18,7 +18,7 @@ from iveg.domain.observations import (
 )
 from iveg.domain.stop import FollowedCommand
 from iveg.domain.transports import DIRECT, FIWARE, Transport, TransportId
-from iveg.pipeline import Choices, build
+from iveg.pipeline import Choices, Pipeline
 from iveg.vital.ports import CommandPort, Ports
 from tests.builders import detection_frame, fleet_of, odometry, origin, safety_report
 from tests.fakes.clock import FakeClock
@@ -54,7 +54,7 @@ class Desk:
         self.sink = FakeRecorder()
         self.choices = FakeChoices()
         self.description = fleet_of(*robots)
-        self.parts = parts = build(
+        self.parts = parts = Pipeline(
             self.description,
             greenhouse,
             Ports(
