@@ -104,7 +104,6 @@ class Pipeline:
         total.update(self.commander.counters)
         total.update(self.core.supervision.counters)
         total["live.browsers"] = self.hub.watchers
-        total["nlos.protected"] = self.evaluator.protected_unseen
         return total
 
 

@@ -21,7 +21,6 @@ from iveg.domain.observations import (
     DetectionFrame,
     Instant,
     Odometry,
-    Origin,
     Received,
     SafetyReport,
 )
@@ -65,8 +64,6 @@ class Evaluator:
         self.speed_limits: dict[str, SpeedLimit] = dict.fromkeys(
             self.world.robots, UNSUPERVISED
         )
-        self.protected_unseen = 0
-        """Number of slow-downs for a person or peer out of the robot's own sight."""
         self._speed_limits = SpeedLimits(core.greenhouse)
         self.tracking = DetectionTracking(core)
         self._staleness = Staleness(core)
@@ -79,7 +76,6 @@ class Evaluator:
         self._moved: dict[str, Odometry] = {}
         self._unjudged: Instant | None = None
         self._started: Instant | None = None
-        self._untold = False
 
     def beginning(self) -> tuple[People, SpeedLimits]:
         """Known people and present limits, for another rule to begin with."""
@@ -198,17 +194,12 @@ class Evaluator:
         ]
         for robot_id in changed:
             self._event_log.changed(topics.ROBOT.of(robot_id))
-            if self.world.robots[robot_id].safety is None:
-                self._log_speed_limit(
-                    robot_id, before[robot_id], speed_limits[robot_id], now
-                )
         slower = any(
             speed_limits[robot_id].speed_factor < before[robot_id].speed_factor
             for robot_id in changed
         )
-        self._untold = self._untold or bool(changed or changes)
-        # A slow-down never waits; other news waits until robots can use more.
-        if slower or (self._untold and self._feedback_publisher.may_publish(now)):
+        if slower:
+            # A slow-down never waits; other news goes with the next heartbeat.
             self.publish(now)
         self._tell("judged", self.rule, speed_limits, changes, now)
 
@@ -218,14 +209,12 @@ class Evaluator:
             ended = self.decisions.end(entry.decision_id, now)
             self._event_log.decisions(ended)
             return
-        self.protected_unseen += not entry.in_sight
         places = places_of(entry, self.world)
         begun = self.decisions.begin(entry, self.rule, places)
         self._event_log.decisions([begun])
 
     def publish(self, now: Instant) -> None:
         """Publish feedback to the fleet (Algorithm 2, line 13)."""
-        self._untold = False
         self._feedback_publisher.publish(self.speed_limits, self.rule, now)
         self._obedience.published(self.speed_limits, now)
         self._event_log.decisions(self.decisions.published(now))
@@ -310,22 +299,6 @@ class Evaluator:
         self._event_log.write(
             lambda: speed_line(report, evidence_of(report, *known), unmet), at
         )
-
-    def _log_speed_limit(
-        self, robot_id: str, before: SpeedLimit, after: SpeedLimit, at: Instant
-    ) -> None:
-        """Log the speed limit of a robot that sends no reports."""
-        if before.speed_factor == after.speed_factor:
-            return
-        report = SafetyReport(
-            robot_id,
-            Origin(),
-            after.speed_factor,
-            after.reason,
-            after.cause,
-            after.decision_id,
-        )
-        self._log_speed(report, at)
 
 
 def _told_of(limit: SpeedLimit) -> tuple[float, str, str | None]:

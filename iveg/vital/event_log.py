@@ -42,7 +42,7 @@ from iveg.domain.stop.commands import write_command
 from iveg.domain.tracking.people import Placed
 from iveg.vital import topics
 from iveg.vital.evidence import left_behind, record_of
-from iveg.vital.record import OdometryThinner, RecordSink
+from iveg.vital.record import ODOMETRY_PERIOD_S, RecordSink
 from iveg.vital.supervision import Supervision
 
 _KEPT_LINES = 500
@@ -79,7 +79,8 @@ class EventLog:
         self.supervision = supervision
         self.margins: Mapping[str, float | None] = {}
         self._sink = sink
-        self._thinner = OdometryThinner()
+        self._told: dict[str, tuple[float, float | None, str]] = {}
+        """Limit, applied factor and link that a robot's pose was last kept with."""
         # The last reading of each robot and kind; the air is of no robot.
         self._kept: dict[tuple[str, type[Observation]], float] = {}
         # Starting at the clock keeps ids growing over restarts without asking anyone.
@@ -153,27 +154,30 @@ class EventLog:
     def odometry(
         self, read: Odometry, robot: RobotState, limit: float, link: str, at: Instant
     ) -> None:
-        """Record a pose, if it is one of the two a second that are kept."""
+        """Record two poses a second, and each change of limit, factor or link."""
+        robot_id, report = robot.robot_id, robot.safety
+        applied = None if report is None else report.speed_factor
+        told, before = (limit, applied, link), self._told.get(robot_id)
+        is_due = self._is_due(robot_id, Odometry, at, ODOMETRY_PERIOD_S)
+        if not is_due and told == before:
+            return
+        self._told[robot_id] = told
         pose, twist = read.pose, read.twist
-        record = self._thinner.thin(
+        self._sink.enqueue(
             OdometryRecord(
                 at=at.wall,
-                robot_id=robot.robot_id,
+                robot_id=robot_id,
                 x=pose.x,
                 y=pose.y,
                 yaw=pose.yaw,
                 linear=twist.linear_x,
                 angular=twist.angular_z,
                 limit_factor=limit,
-                applied_factor=None
-                if robot.safety is None
-                else robot.safety.speed_factor,
+                applied_factor=applied,
                 link=link,
-                margin_m=self.margins.get(robot.robot_id),
+                margin_m=self.margins.get(robot_id),
             )
         )
-        if record is not None:
-            self._sink.enqueue(record)
 
     @_guarded
     def command(
@@ -298,8 +302,8 @@ class EventLog:
     ) -> bool:
         """Whether a period has passed since the last one; the next counts from now."""
         kept = self._kept.get((robot_id, kind), float("-inf"))
-        # Devices that send every minute are late as often as early.
-        is_due = at.mono - kept >= 0.9 * period_s
+        # What comes as often as it is kept is early as often as late.
+        is_due = at.mono - kept >= 0.95 * period_s
         if is_due:
             self._kept[robot_id, kind] = at.mono
         return is_due

@@ -11,8 +11,6 @@ from iveg.domain.robot_state import RobotState
 from iveg.domain.stamps import format_stamp
 from iveg.vital.core import Core
 
-USED_HZ, BURST = 20.0, 8.0
-"""Greatest mean rate of feedback that slows nobody, and size of a burst (1/s, 1)."""
 MOST_ALERTS = 256
 """A robot refuses feedback with more."""
 
@@ -34,21 +32,11 @@ class FeedbackPublisher:
         self._other, self._boot = other, core.boot
         self._fleet, self._probe = core.ports.fleet, core.health_monitor.probe
         self._seq = 0
-        self._left = BURST
-
-    def may_publish(self, now: Instant) -> bool:
-        """Whether robots can use one more: 20 Hz in the mean, a few close together."""
-        return self._allowance(now) >= 1.0
-
-    def _allowance(self, now: Instant) -> float:
-        since = max(0.0, now.mono - self.published_at)
-        return min(BURST, self._left + USED_HZ * since)
 
     def publish(
         self, speed_limits: Mapping[str, SpeedLimit], rule: DetectionRule, now: Instant
     ) -> None:
         """Send every robot what the fleet must know."""
-        self._left = max(0.0, self._allowance(now) - 1.0)
         self.published_at = now.mono
         alerts = _newest(tuple(self._alerts(rule, now)))
         seen = {

@@ -1,7 +1,7 @@
 """Records on their way to the history, and which of them give way under pressure.
 
-Odometry is thinned before it is offered.  The queue is bounded: the oldest telemetry
-gives way first, then the oldest of all but orders, and is counted.
+The queue is bounded: the oldest telemetry gives way first, then the oldest of all but
+orders, and is counted.
 """
 
 from collections import deque
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from iveg.domain.records import OdometryRecord, Record, is_order, is_telemetry
+from iveg.domain.records import Record, is_order, is_telemetry
 
 CAPACITY = 20_000
 ODOMETRY_PERIOD_S = 0.5
@@ -24,33 +24,6 @@ class RecordSink(Protocol):
 
     async def flushed(self) -> None:
         """Return when every command and audit row so far is durable."""
-
-
-class OdometryThinner:
-    """Keeps 2 Hz a robot, and every change of what it was told, applies, or its link.
-
-    The period is counted in the record's own time; one that jumps backwards (a clock
-    that was set) starts a new period rather than silencing the robot.
-    """
-
-    def __init__(self) -> None:
-        self._last: dict[str, OdometryRecord] = {}
-
-    def thin(self, record: OdometryRecord) -> OdometryRecord | None:
-        """The record if it is worth keeping, else None."""
-        last = self._last.get(record.robot_id)
-        if last is not None and not _tells_more(last, record):
-            return None
-        self._last[record.robot_id] = record
-        return record
-
-
-def _tells_more(last: OdometryRecord, record: OdometryRecord) -> bool:
-    said = (last.limit_factor, last.applied_factor, last.link)
-    if said != (record.limit_factor, record.applied_factor, record.link):
-        return True
-    # Robots tick at 10 or 20 Hz: half a tick early must not wait a whole tick more.
-    return not 0.0 <= record.at - last.at < 0.95 * ODOMETRY_PERIOD_S
 
 
 @dataclass(frozen=True, slots=True)

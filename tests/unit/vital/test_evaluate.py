@@ -5,8 +5,6 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.geometry import Rectangle
-from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import Origin
 from iveg.domain.records import (
@@ -19,10 +17,6 @@ from iveg.models.history import Decision
 from tests.builders import detection, detection_frame
 from tests.fakes.records import alert_record
 from tests.unit.vital.desk import Desk, conditions_of
-
-HEDGE = Greenhouse(
-    "hedge", Rectangle(-100, -100, 100, 100), rows=(Rectangle(2.9, -50, 3.1, 50),)
-)
 
 
 def watched(desk: Desk) -> Desk:
@@ -171,16 +165,6 @@ async def test_the_end_of_a_crossing_ends_its_decision() -> None:
     assert newest.ended_at is not None
 
 
-def test_a_robot_that_slows_for_somebody_it_cannot_see_is_counted() -> None:
-    desk = Desk(greenhouse=HEDGE)
-    desk.drive("AGI", 2.0)
-    desk.drive("AGII", 50.0)
-
-    desk.look("AGII", detection("farmer", 3.9))
-
-    assert desk.evaluator.protected_unseen == 1
-
-
 async def test_a_robot_that_does_not_slow_down_raises_a_grave_alert() -> None:
     desk = watched(Desk())
     for number in range(22):
@@ -290,18 +274,6 @@ def test_a_speed_change_is_told_with_who_saw_whom() -> None:
     assert (slots["observer"], slots["distance"]) == ("AGII", 1.5)
 
 
-def test_a_robot_that_reports_nothing_is_told_by_its_speed_limit() -> None:
-    desk = Desk()
-    desk.drive("AGI", 0.0)
-    desk.drive("AGII", 50.0)
-    desk.look("AGI")
-    desk.look("AGII")
-
-    meet(desk)
-
-    assert desk.sentences()[-1] == "log.speed_down.person"
-
-
 def test_a_long_sighting_is_one_line_and_two_rows_a_second() -> None:
     desk = watched(Desk())
     for _ in range(50):
@@ -401,6 +373,20 @@ def test_28_6_a_pose_is_kept_with_its_margin_while_that_is_measured() -> None:
     # Measured; nobody has looked for a second; somebody looks; the robot stands.
     states = [kept(at) is not None for at in (1.0, 1.5, 3.0, 3.5, 4.5, 5.8)]
     assert states == [True, True, False, False, True, False]
+
+
+async def test_two_poses_a_second_are_kept_and_each_change_of_what_is_applied() -> None:
+    desk = watched(Desk())
+    for _ in range(100):
+        await desk.wait(0.05)
+        desk.drive("AGII", 50.0)
+    before = [one for one in desk.records(OdometryRecord) if one.robot_id == "AGII"]
+    desk.report("AGII", factor=0.5, reason="stale")
+    desk.drive("AGII", 50.0)
+
+    newest = desk.records(OdometryRecord)[-1]
+    assert 10 <= len(before) <= 13
+    assert (newest.robot_id, newest.applied_factor) == ("AGII", 0.5)
 
 
 def test_a_late_look_still_protects_whom_it_saw_and_leaves_the_page_alone() -> None:

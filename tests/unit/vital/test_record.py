@@ -1,9 +1,6 @@
-import dataclasses
-
 from iveg.domain.records import RECORD_TYPES, Record, is_telemetry
-from iveg.vital.record import OdometryThinner, RecordQueue, Waiting
+from iveg.vital.record import RecordQueue, Waiting
 from tests.fakes.records import (
-    NOON,
     alert_record,
     audit_record,
     climate_record,
@@ -85,42 +82,3 @@ def test_what_is_put_back_stands_where_it_stood() -> None:
 
     xs = [getattr(record, "x", None) for record in records(queue.dequeue(10))]
     assert xs == [1.0, 2.0, 3.0]
-
-
-def test_odometry_is_thinned_to_two_a_second_for_each_robot() -> None:
-    thinner = OdometryThinner()
-    ticks = [
-        odometry_record(robot_id=robot, at=NOON + tick / 20)
-        for tick in range(201)
-        for robot in ("AGI", "AGII")
-    ]
-
-    kept = [one for one in ticks if thinner.thin(one) is not None]
-
-    assert sum(one.robot_id == "AGI" for one in kept) == 21
-    assert sum(one.robot_id == "AGII" for one in kept) == 21
-
-
-def test_every_change_of_what_a_robot_is_told_or_applies_is_kept() -> None:
-    thinner = OdometryThinner()
-    first = odometry_record(at=NOON)
-    changes = [
-        dataclasses.replace(first, at=NOON + 0.01, limit_factor=0.5),
-        dataclasses.replace(
-            first, at=NOON + 0.02, limit_factor=0.5, applied_factor=0.5
-        ),
-        dataclasses.replace(
-            first, at=NOON + 0.03, limit_factor=0.5, applied_factor=0.5, link="LATE"
-        ),
-    ]
-
-    kept = [thinner.thin(one) for one in [first, *changes, changes[-1]]]
-
-    assert kept == [first, *changes, None]
-
-
-def test_a_clock_that_was_set_back_does_not_silence_a_robot() -> None:
-    thinner = OdometryThinner()
-    thinner.thin(odometry_record(at=NOON))
-
-    assert thinner.thin(odometry_record(at=NOON - 3600.0)) is not None

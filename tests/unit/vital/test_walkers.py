@@ -23,8 +23,8 @@ def beside(
         obstacle = ReportedObstacle(x, y, 0.5, moved)
         desk.hear(replace(told, obstacle=obstacle, origin=desk.next_origin()))
     desk.loop.step([], desk.clock())
-    told_to = desk.fleet.told[-1].speed_limits
-    return {name: one.speed_factor for name, one in told_to.items()}
+    limits = desk.evaluator.speed_limits
+    return {name: one.speed_factor for name, one in limits.items()}
 
 
 def test_who_walks_by_one_robots_laser_slows_the_other_for_three_seconds() -> None:
