@@ -5,7 +5,7 @@ Here alone comfort is had to listen to what is vital.
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 
 from iveg.comfort.equipment import PART as EQUIPMENT
@@ -19,7 +19,6 @@ from iveg.domain.events import LogEvent
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency import LatencyWatch
-from iveg.domain.tracking.looks import Calibrations
 from iveg.domain.tracking.people import People
 from iveg.domain.world import World
 from iveg.vital.command import Commander
@@ -44,7 +43,6 @@ class Choices:
         boot: Random, new at each start; identity of our feedback.
         era: Ends the ids of people, which are unique across starts by it.
         tiles: Of other equipment.
-        calibrations: How sure a look of a detector makes.
         refused: Robots of the fleet that are not heard.
     """
 
@@ -52,7 +50,6 @@ class Choices:
     boot: str = "iveg-boot"
     era: str = ""
     tiles: Sequence[Tile] = ()
-    calibrations: Calibrations = field(default_factory=Calibrations)
     refused: Sequence[str] = ()
 
 
@@ -117,7 +114,7 @@ def _core(
         world.robot(robot_id).refused = True
     return Core(
         world,
-        People(greenhouse, choices.era, choices.calibrations),
+        People(greenhouse, choices.era),
         greenhouse,
         ports,
         EventLog(ports.sink, start, supervision),

@@ -63,6 +63,7 @@ _SECRETS: Final = frozenset(
 GONE: Final = frozenset(
     {
         "IVEG_BROKER_ACCESS_COMMAND",
+        "IVEG_CALIBRATION",
         "IVEG_DRILL_DAYS",
         "IVEG_FOXGLOVE",
         "IVEG_ORION_THROTTLE",
@@ -350,12 +351,6 @@ class Settings:
     )
     equipment: str = setting(
         "IVEG_EQUIPMENT", "", "File of docs/equipment.md, or `demo`; empty: none."
-    )
-    calibration: str = setting(
-        "IVEG_CALIBRATION",
-        "",
-        'File of docs/safety.md, "Calibration", or `paper`; '
-        "empty: confidences count as told.",
     )
 
     @classmethod

@@ -19,7 +19,6 @@ from fastapi import FastAPI
 
 from iveg import __version__
 from iveg.adapters import clock
-from iveg.adapters.calibration_files import load_calibrations
 from iveg.adapters.clock import new_id
 from iveg.adapters.direct import DirectReader
 from iveg.adapters.equipment_files import load_equipment
@@ -117,7 +116,6 @@ class Dss:
                 boot,
                 f"-{boot[:8]}",
                 load_equipment(settings.equipment, fleet.ids),
-                load_calibrations(settings.calibration),
                 settings.refused_robots,
             ),
         )

@@ -11,9 +11,8 @@ the way up and a clock that is behind look alike (docs/safety.md, "Age"), and th
 say how wrong that may be.  Where they rule zero out, the middle counts, if they are
 narrow.
 
-::
-
-    contradicts the bounds ──> unused until five agree ──> new bounds: it was set
+A message that contradicts the bounds is not used: the clock was set, and new bounds
+begin with it.
 """
 
 from dataclasses import dataclass
@@ -25,7 +24,6 @@ STAMP_S: Final = 0.001
 """Resolution of a stamp (s): what lies below zero by less is zero."""
 LONGEST_S: Final = 60.0
 """A longer time is not counted: the stamp is wrong, or the message was replayed."""
-AGREE: Final = 5
 TRUSTED_S: Final = 0.1
 """Half the width of bounds (s) that an offset other than zero may have."""
 _WINDOW_S: Final = 60.0
@@ -68,7 +66,6 @@ class ClockOffset:
         self.state: State = "unknown"
         self.offset_s: float | None = None
         self._since = -_INF
-        self._suspects: list[Bounds] = []
 
     def time_message(
         self, stamp_s: float, at: Instant, composed_at: float | None
@@ -88,9 +85,9 @@ class ClockOffset:
         high = _INF if composed_at is None else low + max(0.0, at.mono - composed_at)
         found = Bounds(low, high)
         if self._is_jump(found):
-            self._suspect(found, at.mono)
+            self._older, self._newer, self._since = _ANYTHING, found, at.mono
+            self._settle()
             return None
-        self._suspects.clear()
         self._note(found, at.mono)
         if self.offset_s is None or self.offset_s - low < -STAMP_S:
             return None
@@ -111,19 +108,6 @@ class ClockOffset:
         # Nothing bounds it from above: a leap into the future shows itself by its size.
         is_open = self.bounds.high == _INF and self.bounds.low > -_INF
         return is_open and found.low > max(0.0, self.bounds.low) + _SAME_S
-
-    def _suspect(self, found: Bounds, now: float) -> None:
-        """One more message of a clock that was set, or only seems to have been."""
-        if self._suspects and abs(found.low - self._suspects[0].low) > _SAME_S:
-            self._suspects.clear()
-        self._suspects.append(found)
-        if len(self._suspects) < AGREE:
-            return
-        low = max(bounds.low for bounds in self._suspects)
-        high = min(bounds.high for bounds in self._suspects)
-        self._suspects.clear()
-        self._older, self._newer, self._since = _ANYTHING, Bounds(low, high), now
-        self._settle()
 
     def _note(self, found: Bounds, now: float) -> None:
         if now - self._since >= _WINDOW_S:

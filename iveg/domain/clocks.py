@@ -1,10 +1,10 @@
 """Delay of a robot's messages, estimated from its clock (docs/safety.md, "Age").
 
-A stamp says how long a message travelled, relative to the fastest one of the same boot
-and transport within a minute (the minimum filter of NTP).  A constant delay and a wrong
-clock look alike from one side, so this is an estimate.  It serves robots that do not
-echo, and the display of the offset.  Moments are iVeg's monotonic clock, which nobody
-sets.
+A stamp says how long a message travelled, relative to the fastest one of the same boot,
+kind and transport within a minute (the minimum filter of NTP).  A constant delay and a
+wrong clock look alike from one side, so this is an estimate.  It serves robots that do
+not echo, and the display of the offset.  Moments are iVeg's monotonic clock, which
+nobody sets.
 """
 
 from collections import deque
@@ -12,97 +12,59 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from iveg.domain.limits import LIMITS
-from iveg.domain.observations import DetectionFrame, Instant, Origin
+from iveg.domain.observations import DetectionFrame, Instant, Odometry, Origin
 from iveg.domain.transports import FIWARE, TransportId
 
 _BUCKET_S, _BUCKETS = 5.0, 12
 STEP_S = 0.5
 """A clock that leaps by less is corrected within a minute, unnoticed."""
-AGREE = 5
-"""Messages of one transport and boot that must agree before a leap is believed."""
 
 Kind = type
-Place = tuple[int | None, float]
 
 
 @dataclass(slots=True)
 class ClockFilter:
-    """The fastest message of the last minute, of one transport and one boot.
+    """The fastest message of the last minute, of one transport, boot and kind.
 
     A delay lets no stamp fall: a slow transport is never taken for a clock that was
-    set::
-
-        stamps fall while seq rises, or  ──> unknown until five    ──> a new filter
-        a message beats the fastest by       messages agree            begins
-        more than half a second
+    set.  It was where stamps fall while seq rises, or a message beats the fastest by
+    more than half a second.  That message is of unknown age, and the filter begins anew
+    with it.
     """
 
     _buckets: deque[tuple[float, float]] = field(
         default_factory=lambda: deque(maxlen=_BUCKETS)
     )
-    _newest: dict[Kind, Place] = field(default_factory=dict)
-    _suspects: list[float] = field(default_factory=list)
-    _suspected_by: Kind | None = None
+    _seq: int | None = None
+    _stamp_s: float = float("-inf")
     seen_at: float = float("-inf")
     least: float | None = None
     """Arrival less stamp of the fastest message (s); None before the first."""
     newest: float | None = None
     """Arrival less stamp of the newest message (s)."""
 
-    def observe(self, kind: Kind, origin: Origin, now: float) -> float | None:
-        """Take one message in; ``kind`` says whose count its ``seq`` belongs to.
+    def observe(self, origin: Origin, now: float) -> float | None:
+        """Take one message in.
 
         Returns:
-            What it took beyond the fastest one (s), 0 without a stamp; None while
-            nobody can say, because its clock seems to have been set.
+            Time that it took beyond the fastest one (s), 0 without a stamp; None where
+            nobody can say, because its clock was set.
         """
         if origin.stamp_s is None:
             return 0.0
         transit, self.seen_at = now - origin.stamp_s, now
-        self.newest = transit
-        is_next, fell = self._place(kind, origin.seq, origin.stamp_s)
-        least = self.least
-        if least is None:
-            self._note(now, transit)
-            return 0.0
-        leaps = transit < least - STEP_S or (fell and transit > least + STEP_S)
-        if leaps or self._is_suspect(transit):
-            return self._suspect(kind, transit, now)
-        if is_next and kind is self._suspected_by:
-            # The very sender is back where it was: one stamp was wrong.
-            self._forget_suspects()
-        self._note(now, transit)
-        return max(0.0, transit - least)
-
-    def _place(self, kind: Kind, seq: int | None, stamp_s: float) -> tuple[bool, bool]:
-        """Whether it is the newest of its kind, and its stamp fell all the same."""
-        before, last = self._newest.get(kind, (None, float("-inf")))
+        least = transit if self.least is None else self.least
+        seq, before = origin.seq, self._seq
         if seq is not None and before is not None and seq <= before:
-            return False, False
-        self._newest[kind] = seq, stamp_s
-        return True, stamp_s < last - STEP_S
-
-    def _is_suspect(self, transit: float) -> bool:
-        return bool(self._suspects) and abs(transit - self._suspects[0]) <= STEP_S
-
-    def _suspect(self, kind: Kind, transit: float, now: float) -> float | None:
-        """One more message of a clock that was set, or only seems to have been."""
-        if not self._is_suspect(transit):
-            self._forget_suspects()
-        if not self._suspects:
-            self._suspected_by = kind
-        self._suspects.append(transit)
-        if len(self._suspects) < AGREE:
-            return None
-        least = min(self._suspects)
-        self._buckets.clear()
-        self._forget_suspects()
-        self._note(now, least)
-        return transit - least
-
-    def _forget_suspects(self) -> None:
-        self._suspects.clear()
-        self._suspected_by = None
+            # Out of order: it may be from before the clock was set.
+            return max(0.0, transit - least)
+        fell = origin.stamp_s < self._stamp_s - STEP_S
+        was_set = transit < least - STEP_S or (fell and transit > least + STEP_S)
+        self._seq, self._stamp_s, self.newest = seq, origin.stamp_s, transit
+        if was_set:
+            self._buckets.clear()
+        self._note(now, transit)
+        return None if was_set else max(0.0, transit - least)
 
     def _note(self, now: float, transit: float) -> None:
         buckets = self._buckets
@@ -122,15 +84,15 @@ _TOLERANCE_S = 0.25
 _APART_S = 2.0
 """For so long a detector has to be apart before its clock is accused."""
 OFFSET_WARN_S, _WARNED_S = 0.25, 60.0
-_MAX_FILTERS = 16
+_MAX_FILTERS = 32
 
-_Sender = tuple[TransportId, str | None, bool]
-"""Transport, boot, and whether it is the detector."""
+_Stream = tuple[TransportId, str | None, Kind]
+"""Transport, boot and kind."""
 
 
 @dataclass(slots=True)
 class RobotClock:
-    """All that is estimated of one robot's clock: a filter a transport and boot.
+    """All that is estimated of one robot's clock: a filter for each stream.
 
     A detector may stamp by a clock of its own (simulation time, another zone).  Its
     frames are compared with the odometry that came last: farther apart than any frame
@@ -146,7 +108,7 @@ class RobotClock:
     detector_accused_at: float | None = None
     _apart: tuple[float, float] | None = None
     """Since when frames are apart, and by what (s)."""
-    _filters: dict[_Sender, ClockFilter] = field(default_factory=dict)
+    _filters: dict[_Stream, ClockFilter] = field(default_factory=dict)
     _warned: tuple[float, float] = (float("-inf"), 0.0)
 
     def delay(
@@ -162,7 +124,7 @@ class RobotClock:
         ``lag`` (s) is that of iVeg's own probe through FIWARE, None before one came
         back: what FIWARE alone brings is never younger.
         """
-        own = self._filter(transport, origin.boot, kind).observe(kind, origin, at.mono)
+        own = self._filter((transport, origin.boot, kind)).observe(origin, at.mono)
         if kind is DetectionFrame:
             beyond = self._beyond_odometry(transport, origin, at.mono)
             if beyond is None:
@@ -178,16 +140,13 @@ class RobotClock:
             return max(against_direct, lag or 0.0)
         return None if own is None or lag is None else max(own, lag)
 
-    def _filter(
-        self, transport: TransportId, boot: str | None, kind: Kind
-    ) -> ClockFilter:
-        """The filter of a sender; detectors have their own, which fools no other."""
-        sender = transport, boot, kind is DetectionFrame
-        if sender not in self._filters:
+    def _filter(self, stream: _Stream) -> ClockFilter:
+        """The filter of a stream; the oldest gives way to a new one."""
+        if stream not in self._filters:
             while len(self._filters) >= _MAX_FILTERS:
                 del self._filters[next(iter(self._filters))]
-            self._filters[sender] = ClockFilter()
-        return self._filters[sender]
+            self._filters[stream] = ClockFilter()
+        return self._filters[stream]
 
     def _beyond_odometry(
         self, transport: TransportId, origin: Origin, now: float
@@ -196,7 +155,7 @@ class RobotClock:
 
         None where it is stamped by another clock.
         """
-        odometry = self._filters.get((transport, origin.boot, False))
+        odometry = self._filters.get((transport, origin.boot, Odometry))
         if odometry is None or odometry.newest is None or origin.stamp_s is None:
             return 0.0
         transit = now - origin.stamp_s
@@ -226,7 +185,7 @@ class RobotClock:
         The first frame behind a gap is as late as the gap was long, and nothing tells
         that from another clock until odometry has passed it, too.
         """
-        odometry = self._filters[transport, origin.boot, False]
+        odometry = self._filters[transport, origin.boot, Odometry]
         return now - odometry.seen_at <= _HEARD_S
 
     def _against_direct(self, origin: Origin, now: float) -> float | None:
@@ -245,9 +204,9 @@ class RobotClock:
         return max(0.0, beyond)
 
     def _direct(self) -> Iterator[tuple[str | None, ClockFilter]]:
-        """Boot and filter of what came by another way than FIWARE, detectors apart."""
-        for (transport, boot, is_detector), one in self._filters.items():
-            if transport != FIWARE.id and not is_detector:
+        """Boot and filter of what came past FIWARE, detectors apart."""
+        for (transport, boot, kind), one in self._filters.items():
+            if transport != FIWARE.id and kind is not DetectionFrame:
                 yield boot, one
 
     def offset_s(self, now: Instant) -> float | None:

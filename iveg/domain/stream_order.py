@@ -17,9 +17,8 @@ OrderVerdict = Literal["new", "late", "duplicate", "refused"]
 _REMEMBERED_SEQS = 512
 """Copies of the last ten seconds and more, at 30 Hz, are known for copies."""
 _REMEMBERED_BOOTS = 16
-_GROWN_TO_RETURN = 5
-_LEAP = 100_000
-"""No count goes on so far unheard: it is an hour of 30 messages a second."""
+ALONE_S = 1.0
+"""An old boot that alone speaks for so long is the present one again."""
 _ROUNDING_S = 1e-6
 
 
@@ -58,11 +57,9 @@ class StreamOrder:
     """The position of one stream (robot and kind).
 
     A straggler of an unknown boot looks like a new start, and would make the present
-    boot an old one for ever.  So an old boot that goes on counting, five times with no
-    message of the present one in between, becomes the present one again; and at once
+    boot an old one for ever.  So an old boot that goes on counting for a second, with
+    no message of the present one in between, becomes the present one again; and at once
     when it has heard feedback from after the straggler, which itself proves nothing.
-    One wrong number would make all true ones late, too: a count that leaps is believed
-    when five go on from there.
     """
 
     boot: str | None = None
@@ -71,10 +68,8 @@ class StreamOrder:
     """Arrival of the boot's first message (monotonic, s)."""
     _is_proven: bool = False
     _old: dict[str, int] = field(default_factory=dict)
-    _returning: str | None = None
-    _grown: int = 0
-    _leapt_to: int | None = None
-    _leapt: int = 0
+    _returning: tuple[str, float] | None = None
+    """The old boot that speaks alone, and since when (monotonic, s)."""
     _recent: deque[int] = field(default_factory=deque)
     _known: set[int] = field(default_factory=set)
     """The same, to look them up: what FIWARE brings is a copy nearly always."""
@@ -84,7 +79,7 @@ class StreamOrder:
         return self.boot is not None and origin.boot != self.boot
 
     def judge(
-        self, origin: Origin, arrived: float = inf, proven_at: float | None = None
+        self, origin: Origin, arrived: float = 0.0, proven_at: float | None = None
     ) -> OrderVerdict:
         """Judge whether a message is newer than all before, and remember it.
 
@@ -96,15 +91,12 @@ class StreamOrder:
         if boot is None or seq is None:
             return "new"
         if boot != self.boot:
-            if boot in self._old and not self._returns(boot, seq, proven_at):
+            if boot in self._old and not self._returns(origin, arrived, proven_at):
                 return "late"
             self._begin(boot, seq, arrived, is_proven=proven_at is not None)
             return "new"
         self._returning = None
         self._is_proven |= proven_at is not None
-        if seq - self.seq > _LEAP and not self._goes_on(seq):
-            return "late"
-        self._leapt_to = None
         if seq in self._known:
             return "duplicate"
         self._remember(seq)
@@ -113,24 +105,17 @@ class StreamOrder:
         self.seq = seq
         return "new"
 
-    def _returns(self, boot: str, seq: int, proven_at: float | None) -> bool:
+    def _returns(self, origin: Origin, arrived: float, proven_at: float | None) -> bool:
         """Whether an old boot lives: it echoes that, or goes on counting alone."""
+        boot, seq = origin.boot or "", origin.seq or 0
         if seq <= self._old[boot]:
             return False
         self._old[boot] = seq
         if proven_at is not None and proven_at > self._began and not self._is_proven:
             return True
-        if boot != self._returning:
-            self._returning, self._grown = boot, 0
-        self._grown += 1
-        return self._grown >= _GROWN_TO_RETURN
-
-    def _goes_on(self, seq: int) -> bool:
-        """Whether a count that leapt has gone on from there."""
-        known, self._leapt_to = self._leapt_to, seq
-        near = known is not None and 0 < seq - known <= _LEAP
-        self._leapt = self._leapt + 1 if near else 1
-        return self._leapt >= _GROWN_TO_RETURN
+        if self._returning is None or self._returning[0] != boot:
+            self._returning = boot, arrived
+        return arrived - self._returning[1] >= ALONE_S
 
     def _begin(self, boot: str, seq: int, arrived: float, *, is_proven: bool) -> None:
         self._old.pop(boot, None)

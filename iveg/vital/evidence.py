@@ -101,7 +101,7 @@ def _parameters(rule: DetectionRule, zone: Zone) -> dict[str, object]:
 
 def _looks(looks: Looks) -> dict[str, object]:
     document = asdict(looks) | {"probability": round(looks.probability, 4)}
-    del document["confirmed"], document["lent"]
+    del document["confirmed"]
     return document
 
 

@@ -4,12 +4,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.tracking.looks import (
-    ANY,
-    FARTHEST,
-    Calibration,
-    Calibrations,
-)
 from tests.builders import at, detection
 from tests.unit.domain.scene import Scene
 
@@ -37,16 +31,12 @@ def rings_of(scene: Scene) -> set[tuple[float, float]]:
     }
 
 
-_OFFSETS = st.floats(-FARTHEST, FARTHEST)
-
-
-@given(st.lists(_STEP, max_size=16), _OFFSETS)
+@given(st.lists(_STEP, max_size=16))
 def test_every_ring_of_the_boxes_alone_is_there_and_no_robot_is_ever_faster(
-    run: list[tuple[float, str, list[tuple[float, float]]]], offset: float
+    run: list[tuple[float, str, list[tuple[float, float]]]],
 ) -> None:
     single = Scene(rule=DetectionRule(possible_people=False))
-    rows = Calibrations({(ANY, "person"): Calibration(offset)})
-    summed = Scene(rule=DetectionRule(), calibrations=rows)
+    summed = Scene(rule=DetectionRule())
     for after_s, observer, picture in run:
         limits = []
         for scene in (single, summed):

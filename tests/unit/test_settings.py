@@ -175,7 +175,6 @@ GOOD = {
     "IVEG_GREENHOUSE": "none",
     "IVEG_MESSAGES_FILE": "messages.toml",
     "IVEG_EQUIPMENT": "demo",
-    "IVEG_CALIBRATION": "paper",
     "IVEG_FLEET": "/etc/iveg/fleet.toml",
 }
 

@@ -26,8 +26,6 @@ from iveg.domain.tracking.looks import (
     FAINT_FROM,
     KEPT_FROM,
     MOST_SUSPECTS,
-    Calibration,
-    Calibrations,
     FaintPerson,
     Looks,
     Suspicions,
@@ -82,16 +80,9 @@ class People:
     Args:
         greenhouse: What is seen beyond its outer wall is of doubtful position.
         era: Ends every id.
-        calibrations: How sure a look makes.
     """
 
-    def __init__(
-        self,
-        greenhouse: Greenhouse | None = None,
-        era: str = "",
-        calibrations: Calibrations | None = None,
-    ) -> None:
-        self._calibrations = calibrations or Calibrations()
+    def __init__(self, greenhouse: Greenhouse | None = None, era: str = "") -> None:
         self._bounds = None if greenhouse is None else greenhouse.bounds
         self._suspicions = Suspicions()
         self._tracker = Tracker(numbers=TrackNumbers(era))
@@ -106,7 +97,7 @@ class People:
 
     def copy(self) -> "People":
         """Another that knows the same, and takes the same words of operators."""
-        shared = self.things, self._bounds, self._calibrations
+        shared = self.things, self._bounds
         return deepcopy(self, {id(one): one for one in shared})
 
     @property
@@ -134,8 +125,7 @@ class People:
         pose = observer.pose_at_stamp(frame.origin.own_s)
         placed = self._place(frame, observer, pose, rule)
         if rule.possible_people:
-            row = self._calibrations.row_of(frame.detector, "person")
-            placed = self._suspect(placed, observer, rule, at, row)
+            placed = self._suspect(placed, observer, rule, at)
         placed = [
             self._doubt(_match_peer(one, observer, world, at), pose, observer)
             for one in placed
@@ -173,22 +163,15 @@ class People:
         observer: RobotState,
         rule: DetectionRule,
         at: Instant,
-        calibration: Calibration,
     ) -> list[Placed]:
         """Note all looks at everybody; raise faint people whom these confirm."""
         suspects = sorted(filter(_is_suspect, placed), key=_confidence, reverse=True)
         del suspects[MOST_SUSPECTS:]
         seen = [FaintPerson(*one.position[:2], _confidence(one)) for one in suspects]
-        known = self._suspicions.look(
-            observer.robot_id,
-            seen,
-            at,
-            rule.threshold.of("person"),
-            observer.recording,
-            calibration,
-        )
-        of = {id(one): looks for one, looks in zip(suspects, known, strict=True)}
-        return [_looked_at(one, of.get(id(one))) for one in placed]
+        least = rule.threshold.of("person")
+        known = self._suspicions.look(observer.robot_id, seen, at, least)
+        looks = {id(one): found for one, found in zip(suspects, known, strict=True)}
+        return [_looked_at(one, looks.get(id(one))) for one in placed]
 
     def _doubt(self, one: Placed, pose: Pose2D | None, observer: RobotState) -> Placed:
         """Doubt a detection beyond the walls (docs/safety.md, "The rule")."""

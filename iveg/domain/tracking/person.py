@@ -67,11 +67,9 @@ class Sighting:
     beyond_m: float = 0.0
 
     @property
-    def kind(self) -> tuple[bool, bool, bool]:
-        """Evidence that it counts by: looks, laser, others' looks; one for a chain."""
-        looks = self.looks
-        is_lent = self.possible and looks is not None and looks.lent
-        return self.possible, self.laser, is_lent
+    def kind(self) -> tuple[bool, bool]:
+        """Evidence that it counts by: looks, laser; one for a chain."""
+        return self.possible, self.laser
 
     @property
     def lasts_s(self) -> float:

@@ -17,7 +17,6 @@ from iveg.domain.observations import (
 )
 from iveg.domain.rule.judge import SpeedLimits
 from iveg.domain.rule.zones import LimitChange
-from iveg.domain.tracking.looks import Calibrations
 from iveg.domain.tracking.people import People, Placed
 from iveg.domain.tracking.person import TrackedPerson
 from iveg.domain.tracking.sight import BlindCameras, Look, OwnSight
@@ -47,7 +46,6 @@ class Scene:
         robots: As ``IVEG_ROBOTS`` names them, recordings included.
         now: Seconds since the start.
         replay: The map frame by which every message is marked.
-        calibrations: How sure a look of a detector makes.
     """
 
     robots: tuple[str, ...] = ("AGI", "AGII")
@@ -55,12 +53,11 @@ class Scene:
     rule: DetectionRule = field(default_factory=DetectionRule)
     now: float = 0.0
     replay: str | None = None
-    calibrations: Calibrations = field(default_factory=Calibrations)
     changes: list[LimitChange] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.world = World(fleet_of(*self.robots))
-        self.people = People(self.greenhouse, calibrations=self.calibrations)
+        self.people = People(self.greenhouse)
         self.speed_limits = SpeedLimits(self.greenhouse)
         self.own_sight = OwnSight(self.greenhouse)
         self.blind = BlindCameras(self.greenhouse)

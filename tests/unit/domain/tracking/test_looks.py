@@ -8,7 +8,6 @@ import pytest
 from iveg.domain.tracking.looks import (
     LOOK_S,
     MOST_SUSPECTS,
-    Calibration,
     FaintPerson,
     Looks,
     Suspicions,
@@ -31,9 +30,8 @@ class Robots:
         seen: Sequence[FaintPerson],
         moment: float,
         robot: str = "AGI",
-        recording: str | None = None,
     ) -> list[Looks]:
-        found = self.suspicions.look(robot, seen, at(moment), 0.8, recording)
+        found = self.suspicions.look(robot, seen, at(moment), 0.8)
         return [one for one in found if one is not None]
 
 
@@ -41,20 +39,6 @@ def probability(*confidences: float) -> float:
     """What so many independent looks come to, by Bayes' rule with an even prior."""
     odds = math.prod(one / (1.0 - one) for one in confidences)
     return odds / (1.0 + odds)
-
-
-@pytest.mark.parametrize(("offset", "confirmed"), [(-0.5, False), (0.5, True)])
-def test_looks_count_by_the_calibration_of_their_detector(
-    offset: float, confirmed: bool
-) -> None:
-    suspicions, row = Suspicions(), Calibration(offset)
-    suspicions.look("AGI", [seen(0.65)], at(0.0), 0.8, None, row)
-    (looks,) = suspicions.look("AGI", [seen(0.65)], at(LOOK_S), 0.8, None, row)
-
-    assert looks is not None
-    told = 2 * (math.log(0.65 / 0.35) + offset)
-    assert looks.probability == pytest.approx(1 / (1 + math.exp(-told)))
-    assert (looks.least, looks.most, looks.confirmed) == (0.65, 0.65, confirmed)
 
 
 def test_two_looks_are_surer_than_either() -> None:
@@ -105,27 +89,10 @@ def test_who_walks_on_is_the_same_and_who_stands_elsewhere_another() -> None:
     assert (walked.count, other.count) == (2, 1)
 
 
-def test_looks_of_robots_at_one_place_count_together() -> None:
-    robots = Robots()
-    robots.look([seen(0.7), seen(0.7, x=9.0)], 0.0)
-    (looks,) = robots.look([seen(0.75, x=5.4)], 0.1, "AGII")
-
-    assert (looks.count, looks.least, looks.most, looks.over_s) == (2, 0.7, 0.75, 0.1)
-    assert looks.probability == pytest.approx(probability(0.7, 0.75))
-    assert looks.confirmed
-
-
-@pytest.mark.parametrize(
-    ("moment", "x", "recording"),
-    [(1.1, 5.0, None), (0.1, 8.0, None), (0.1, 5.0, "D1")],
-    ids=["a second ago", "elsewhere", "of a recording"],
-)
-def test_other_looks_of_other_robots_do_not_count(
-    moment: float, x: float, recording: str | None
-) -> None:
+def test_looks_of_other_robots_do_not_count() -> None:
     robots = Robots()
     robots.look([seen()], 0.0)
-    (looks,) = robots.look([seen(x=x)], moment, "AGII", recording)
+    (looks,) = robots.look([seen()], 0.1, "AGII")
 
     assert looks.count == 1
 
