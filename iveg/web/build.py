@@ -138,7 +138,6 @@ def build_app(
         app.router.routes.extend(router.routes)
     problems.install(app, pages.problem)
     identify, clock = web.authenticator.identify, web.clock
-    app.add_middleware(headers.ReadableBodies)
     app.add_middleware(
         audited.AuditRequests, identify=identify, trail=web.trail, clock=clock
     )

@@ -15,6 +15,7 @@ import jsonschema_rs
 import pytest
 import requests
 import schemathesis
+from fastapi.routing import iter_route_contexts
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from schemathesis import APIOperation, Case, GenerationMode
@@ -26,7 +27,7 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from iveg.web.security.requirements import declared_actions
+from iveg.web.security.requirements import declared_action
 from iveg.web.security.roles import MAY
 from tests.unit.web.whole import STRANGER, WholeServer, whole_server
 
@@ -56,12 +57,18 @@ def server(tmp_path: Path) -> Iterator[WholeServer]:
 def test_every_route_does_what_its_document_says_to_whoever_asks(
     server: WholeServer,
 ) -> None:
-    document, actions = server.app.openapi(), declared_actions(server.app)
+    document = server.app.openapi()
+    actions = {
+        (str(route.path_format), method): declared_action(route)
+        for route in iter_route_contexts(server.app.routes)
+        for method in route.methods or ()
+    }
     found: dict[tuple[str, str], str] = {}
     asked: set[tuple[str, int]] = set()
 
     for operation in _operations(document):
         action = actions[operation.path, operation.method.upper()]
+        assert action is not None
         for role, case, answer in _explored(server, operation):
             asked.add((operation.label, answer.status_code))
             about = f"{role}: {answer.request.url!s:.200} {case.body!r:.200}"

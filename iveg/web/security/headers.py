@@ -4,13 +4,10 @@ Pure ASGI.  Notifications come hundreds of times a second and no browser reads t
 answers, so their path is recognized first and passes the size limit alone.
 """
 
-from starlette.datastructures import Headers, MutableHeaders
+from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from iveg.domain.errors import UnreadableError
-from iveg.ngsi.codec import load_json
 from iveg.web.problems import Problem
 
 MAX_BODY = 1_048_576
@@ -18,8 +15,6 @@ MAX_BODY = 1_048_576
 TOO_LONG = f"A body may have {MAX_BODY} bytes at most."
 
 NOTIFICATIONS_PATH = "/ngsi/notifications"
-_BROKEN = b"{"
-_BODILESS = frozenset({"GET", "HEAD", "OPTIONS"})
 
 CONTENT_SECURITY_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
@@ -112,51 +107,3 @@ def _declared_length(scope: Scope) -> int | None:
         if name == b"content-length":
             return int(value) if value.isdigit() else None
     return None
-
-
-class ReadableBodies:
-    """Refuses JSON that no reader of iVeg takes: NaN, half characters, other encodings.
-
-    The web framework's own reader lets them through, to break whoever writes them on.
-    Where STOP is pressed nothing is refused: a press with a broken body is one.
-    """
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request."""
-        if scope["type"] != "http" or not _brings_json(scope):
-            await self._app(scope, receive, send)
-            return
-        try:
-            body = await Request(scope, receive).body()
-        except ClientDisconnect:
-            return
-        try:
-            if body:
-                load_json(body)
-        except UnreadableError:
-            # The route itself says no, so that the audit knows which one it was.
-            body = _BROKEN
-        await self._app(scope, _once(body, receive), send)
-
-
-def _brings_json(scope: Scope) -> bool:
-    if scope["method"] in _BODILESS or scope["path"].endswith("/stop"):
-        return False
-    media_type = Headers(scope=scope).get("content-type", "")
-    return media_type.partition(";")[0].strip().lower() == "application/json"
-
-
-def _once(body: bytes, receive: Receive) -> Receive:
-    is_given = False
-
-    async def receive_again() -> Message:
-        nonlocal is_given
-        if is_given:
-            return await receive()
-        is_given = True
-        return {"type": "http.request", "body": body, "more_body": False}
-
-    return receive_again

@@ -1,8 +1,8 @@
 """Role that each route asks of its caller, and its refusals in the OpenAPI document.
 
-Every route declares its role with ``require``; ``declared_action`` reads it.  The
-OpenAPI document tells the refusals that follow from role, parameters and body (RFC
-9457, ``web/problems.py``); others a route names itself: ``responses=refusals(409)``.
+Every route declares its role with ``require``; ``declared_action`` reads it.  In the
+OpenAPI document any route may refuse with a problem (RFC 9457, ``web/problems.py``);
+statuses that need an explanation a route names itself: ``responses=refusals(409)``.
 """
 
 from collections.abc import Iterator, Mapping
@@ -12,11 +12,9 @@ from typing import Annotated, Any, Final
 
 from fastapi import Depends, FastAPI
 from fastapi.dependencies.models import Dependant
-from fastapi.routing import iter_route_contexts
 from starlette.requests import HTTPConnection, Request
 from starlette.websockets import WebSocket
 
-from iveg.web.security.audited import READING
 from iveg.web.security.authentication import Authenticator
 from iveg.web.security.roles import NOBODY, Action, Principal
 
@@ -103,20 +101,21 @@ _FASTAPIS_OWN: Final = ("HTTPValidationError", "ValidationError")
 
 def refusals(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """The ``responses`` of a route that refuses with these statuses."""
-    return {status: _refusal(status) for status in statuses}
+    return {status: _problem(HTTPStatus(status).phrase) for status in statuses}
 
 
 class DocumentedApp(FastAPI):
-    """An application whose document tells refusals as they are sent."""
+    """An application whose document tells each refusal as it is sent."""
 
     def openapi(self) -> dict[str, Any]:
         """The document; made once."""
         if self.openapi_schema is None:
-            document, actions = super().openapi(), declared_actions(self)
-            for path, methods in document["paths"].items():
-                for method, operation in methods.items():
-                    action = actions.get((path, method.upper()), "open")
-                    _tell_refusals(operation, method.upper(), action)
+            document = super().openapi()
+            for operations in document["paths"].values():
+                for operation in operations.values():
+                    # FastAPI documents its own answer here, which is never sent.
+                    operation["responses"].pop("422", None)
+                    operation["responses"]["default"] = _problem("A refusal")
             schemas = document.setdefault("components", {}).setdefault("schemas", {})
             for name in _FASTAPIS_OWN:
                 schemas.pop(name, None)
@@ -124,39 +123,8 @@ class DocumentedApp(FastAPI):
         return self.openapi_schema or {}
 
 
-def declared_actions(app: FastAPI) -> dict[tuple[str, str], Action]:
-    """Action that each route asks for, by path and method."""
+def _problem(description: str) -> dict[str, Any]:
     return {
-        (str(route.path_format), method): action
-        for route in iter_route_contexts(app.routes)
-        if (action := declared_action(route)) is not None
-        for method in route.methods or ()
-    }
-
-
-def _tell_refusals(operation: dict[str, Any], method: str, action: Action) -> None:
-    answers = operation["responses"]
-    answers |= {str(one): _refusal(one) for one in _refused(operation, method, action)}
-    operation["responses"] = dict(sorted(answers.items()))
-
-
-def _refused(
-    operation: Mapping[str, Any], method: str, action: Action
-) -> Iterator[int]:
-    if action != "open":
-        yield from (401, 403)
-    if any(one["in"] == "path" for one in operation.get("parameters", ())):
-        yield 404
-    if method not in READING:
-        yield from (413, 415)
-    if "422" in operation["responses"]:
-        yield 422
-        if "requestBody" in operation:
-            yield 400
-
-
-def _refusal(status: int) -> dict[str, Any]:
-    return {
-        "description": HTTPStatus(status).phrase,
+        "description": description,
         "content": {"application/problem+json": {"schema": dict(_PROBLEM)}},
     }

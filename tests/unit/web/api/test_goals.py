@@ -35,7 +35,7 @@ async def test_a_goal_is_sent_and_shown_with_the_robot() -> None:
 @pytest.mark.parametrize(
     ("body", "status"),
     [
-        ('{"kind": "here", "x": NaN, "y": 1}', 400),
+        ('{"kind": "here", "x": NaN, "y": 1}', 422),
         ('{"kind": "race"}', 422),
         ('{"kind": "here", "x": 1e5, "y": 1}', 409),
         ('{"kind": "aisle", "aisle": "Pasillo 99"}', 409),
