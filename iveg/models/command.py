@@ -301,25 +301,17 @@ class LatencySpread(Model):
 
 
 class RobotLatency(Model):
-    """One robot's STOPs: how many, and each step from the press on.
+    """One robot's STOPs: how many, and steps from the press on.
 
     Attributes:
         robot_id: The robot.
         stops: How many.
-        accepted: Times of the step.
-        answer: By transport, until it left and until the robot answered.
-        standing: Times of the step.
+        answer: By transport, until the robot said that it has it.
+        standing: Until the first standing sample.
     """
 
     robot_id: str
     stops: int
-    accepted: LatencySpread
-    sent: dict[TransportId, LatencySpread] = Field(
-        description=(
-            "By transport, until it left; ``answer`` until the robot said that it has"
-            " it."
-        )
-    )
     answer: dict[TransportId, LatencySpread]
     standing: LatencySpread
 

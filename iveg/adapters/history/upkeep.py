@@ -16,7 +16,6 @@ from typing import Any, Literal
 from sqlalchemy import (
     ColumnElement,
     Connection,
-    Integer,
     Table,
     TextClause,
     and_,
@@ -313,16 +312,12 @@ class TableStats:
 
 def read_stats(connection: Connection) -> tuple[list[TableStats], int]:
     """Rows of each table, and the size of all (bytes); reads all of it."""
-    found = []
+    found: list[TableStats] = []
     for name, at in AGES.items():
         measured = select(func.count(), func.min(at), func.max(at))
         found.append(TableStats(name, *connection.execute(measured).one()))
     if connection.dialect.name == "postgresql":
-        size = select(func.pg_database_size(func.current_database()))
+        size = "SELECT pg_database_size(current_database())"
     else:
-        pages = text(
-            "SELECT page_count * page_size AS size FROM"
-            " pragma_page_count, pragma_page_size"
-        )
-        size = pages.columns(size=Integer)
-    return found, connection.scalar(size) or 0
+        size = "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size"
+    return found, int(connection.scalar(text(size)) or 0)

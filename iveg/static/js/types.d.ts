@@ -836,13 +836,10 @@ export type Robot = {
   battery: Battery | null;
 };
 
-/** One robot's STOPs: how many, and each step from the press on. */
+/** One robot's STOPs: how many, and steps from the press on. */
 export type RobotLatency = {
   robot_id: string;
   stops: number;
-  accepted: LatencySpread;
-  /** By transport, until it left; ``answer`` until the robot said that it has it. */
-  sent: Record<string, LatencySpread>;
   answer: Record<string, LatencySpread>;
   standing: LatencySpread;
 };

@@ -15,17 +15,14 @@ from iveg.adapters.history.lists import (
     DECISIONS,
     MOST_ROWS,
     Filter,
-    ListOf,
-    R,
 )
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.series import (
     AIR,
     EQUIPMENT,
     SPEEDS,
-    CommandLatency,
-    command_latencies,
     confidence_counts,
+    newest_stops,
     people_seen,
     poses_of,
     series_of,
@@ -43,9 +40,9 @@ from iveg.domain.errors import HopError
 from iveg.domain.fleet import FleetDescription, as_counted
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
-from iveg.domain.records import ByTransport
+from iveg.domain.records import CommandRecord, DecisionRecord
 from iveg.domain.stamps import format_stamp
-from iveg.domain.transports import TRANSPORTS, TransportId
+from iveg.domain.transports import TRANSPORTS
 from iveg.models.base import GreenhouseMap, Point, write_json
 from iveg.models.command import Command, Latency, LatencySpread, RobotLatency
 from iveg.models.history import Day, Encounters, Pass, Slowed, Worked
@@ -98,7 +95,7 @@ def add_routes(
         found = await asyncio.gather(
             queries.ask(series_of, SPEEDS, since, until, asked.robot),
             queries.ask(confidence_counts, since, until, asked.robot),
-            queries.ask(command_latencies, since, until, asked.robot),
+            queries.ask(newest_stops, since, until, asked.robot),
         )
         draw = charts.history_figures
         return await figures(draw, since, until, *found, threshold(), fleet)
@@ -159,9 +156,9 @@ def stop_records_router(
 
     @routes.get("/commands/latency", response_model=Latency)
     async def latency(asked: Annotated[Range, Query()]) -> Response:
-        """P50, P95 and longest of each step, per robot; 15 minutes unless told."""
+        """P50, P95 and longest of answer and standstill, per robot; of 15 minutes."""
         since, until = range_of(asked, clock().wall)
-        found = await queries.ask(command_latencies, since, until, asked.robot)
+        found = await queries.ask(newest_stops, since, until, asked.robot)
         body = Latency(
             since=format_stamp(since),
             until=format_stamp(until),
@@ -203,38 +200,30 @@ def _joined(followed: Command | None, kept: Command | None) -> Command | None:
     return followed.model_copy(update=ended)
 
 
-def _by_robot(found: Iterable[CommandLatency]) -> list[RobotLatency]:
-    by_robot: dict[str, list[CommandLatency]] = defaultdict(list)
-    for one in found:
+def _by_robot(stops: Iterable[CommandRecord]) -> list[RobotLatency]:
+    by_robot: dict[str, list[CommandRecord]] = defaultdict(list)
+    for one in stops:
         by_robot[one.robot_id].append(one)
     robots = sorted(by_robot, key=as_counted)
     return [_robot(robot_id, by_robot[robot_id]) for robot_id in robots]
 
 
-def _robot(robot_id: str, stops: list[CommandLatency]) -> RobotLatency:
+def _robot(robot_id: str, stops: list[CommandRecord]) -> RobotLatency:
+    answers = [one.answer_ms for one in stops]
     return RobotLatency(
         robot_id=robot_id,
         stops=len(stops),
-        accepted=LatencySpread.of(one.accepted_ms for one in stops),
-        sent=_by_transport([one.sent_ms for one in stops]),
-        answer=_by_transport([one.answer_ms for one in stops]),
+        answer={
+            transport.id: LatencySpread.of(one.get(transport.id) for one in answers)
+            for transport in TRANSPORTS
+        },
         standing=LatencySpread.of(one.standstill_ms for one in stops),
     )
 
 
-def _by_transport(took: list[ByTransport]) -> dict[TransportId, LatencySpread]:
-    """Spread for each transport of the table, and for those that rows know besides."""
-    known = dict.fromkeys(one.id for one in TRANSPORTS)
-    known |= dict.fromkeys(transport for one in took for transport in one)
-    return {
-        transport: LatencySpread.of(one.get(transport) for one in took)
-        for transport in known
-    }
-
-
 _DAY = timedelta(days=1)
-_MOST_RECORDS = 20 * MOST_ROWS
-"""So many are read of a day; one with more is told by those."""
+_MOST_DECISIONS = 20 * MOST_ROWS
+"""So many are read; a day with more is told by those."""
 ReadDay = Callable[[date, float], Awaitable[Day]]
 """Has one day read from the history, as far as it has gone (Unix s)."""
 
@@ -255,9 +244,8 @@ async def _read(queries: Queries, greenhouse: Greenhouse, day: date, now: float)
     poses = await queries.ask(poses_of, since, until)
     seen = await queries.ask(people_seen, since, until)
     worked = worked_minutes(poses, greenhouse)
-    decisions = await _records(queries, DECISIONS, since, until)
-    orders = await _records(queries, COMMANDS, since, until)
-    stops = [one for one in reversed(orders) if one.kind == "stop"]
+    decisions = await _decisions(queries, since, until)
+    stops = await queries.ask(newest_stops, since, until)
     slowed = slowed_minutes(decisions, greenhouse, until)
     by_name = [
         Worked(lane=lane, robot_id=robot, minutes=robots[robot])
@@ -284,14 +272,15 @@ async def _read(queries: Queries, greenhouse: Greenhouse, day: date, now: float)
     )
 
 
-async def _records(
-    queries: Queries, listed: ListOf[R], since: float, until: float
-) -> list[R]:
+async def _decisions(
+    queries: Queries, since: float, until: float
+) -> list[DecisionRecord]:
     wanted = Filter(since=since, until=until, limit=MOST_ROWS)
-    found: list[R] = []
-    async for page in queries.pages(listed, await queries.page(listed, wanted), wanted):
+    pages = queries.pages(DECISIONS, await queries.page(DECISIONS, wanted), wanted)
+    found: list[DecisionRecord] = []
+    async for page in pages:
         found += page
-        if len(found) >= _MOST_RECORDS:
+        if len(found) >= _MOST_DECISIONS:
             break
     return found
 

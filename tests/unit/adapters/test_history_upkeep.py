@@ -11,7 +11,7 @@ from iveg.adapters.history.recorder import Recorder, Store
 from iveg.adapters.history.upkeep import SETTLES_S, DiskWatch, HistoryUpkeep
 from iveg.adapters.journal import FileJournal
 from iveg.domain.errors import HopError
-from iveg.domain.records import AuditRecord, LogRecord
+from iveg.domain.records import AuditRecord, LogRecord, Record
 from iveg.domain.retention import DAY_S, DiskSpace, Retention
 from iveg.vital.audit import AuditTrail
 from iveg.vital.record import Waiting
@@ -47,8 +47,8 @@ class Upkeep:
         drives = [odometry_record(at=NOW - n * DAY_S) for n in (29, 31, 31)]
         seen = [detection_record(at=NOW - n * DAY_S) for n in (6, 8)]
         store = Store(url)
-        rows = enumerate([*days, *drives, *seen])
-        store.write([Waiting(one, number, 0.0) for number, one in rows])
+        rows: list[Record] = [*days, *drives, *seen]
+        store.write([Waiting(one, number, 0.0) for number, one in enumerate(rows)])
         store.close()
 
     async def _drop(self) -> bool:
