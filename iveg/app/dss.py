@@ -25,6 +25,8 @@ from iveg.adapters.equipment_files import load_equipment
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.upkeep import PART as RETENTION
+from iveg.adapters.history.upkeep import DiskWatch, HistoryUpkeep
 from iveg.adapters.loop_watch import watch_loop
 from iveg.adapters.messages import AppriseSender, load_messages
 from iveg.adapters.provisioner import Provisioner
@@ -40,8 +42,6 @@ from iveg.comfort.equipment import TICK_S as EQUIPMENT_TICK_S
 from iveg.comfort.maps import COVERAGE_TICK_S, SCAN_TICK_S
 from iveg.comfort.messenger import PART as MESSAGES
 from iveg.comfort.messenger import Messenger
-from iveg.comfort.retention import PART as RETENTION
-from iveg.comfort.retention import HistoryUpkeep
 from iveg.comfort.trials import PART as TRIAL
 from iveg.domain.alerts import MOST_KEPT, read_alert
 from iveg.domain.errors import HopError, SettingsError, VitalPartError
@@ -141,11 +141,12 @@ class Dss:
             clock.now,
         )
         self.upkeep = HistoryUpkeep(
-            self.stores.retained(),
+            self.stores.recorder,
+            self.stores.queries,
             settings.retention,
             core.event_log,
-            self.supervision,
             self.trail,
+            DiskWatch(self.stores.directory, inputs.drop_oldest, self.supervision),
         )
         failed = partial(self.supervision.failed, "worker")
         self.worker, self.packer = Worker(failed), Worker(failed, PACK_LIMIT_S)

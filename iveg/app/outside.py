@@ -17,7 +17,6 @@ from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.history.engine import history_url, sqlite_file
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, spilled_file
-from iveg.adapters.history.upkeep import RecordedHistory
 from iveg.adapters.identity_provider import Client, IdentityProvider, Keyrock
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.journal import FileJournal
@@ -61,15 +60,6 @@ class Stores:
     def history_state(self) -> HopState:
         """State of the history."""
         return self.recorder.state(clock.now())
-
-    def retained(self) -> RecordedHistory:
-        """The history as its upkeep sees it."""
-        return RecordedHistory(
-            self.recorder,
-            self.queries,
-            self.directory,
-            drop_recording=self.inputs.drop_oldest,
-        )
 
     def kept_choices(self, settings: Settings) -> KeptChoices:
         """Choices of earlier runs; the settings have the rule where there is none."""

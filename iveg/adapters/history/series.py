@@ -20,7 +20,7 @@ from iveg.adapters.history.tables import (
     odometry,
 )
 from iveg.domain.day import DaySighting, Pose
-from iveg.domain.records import ByTransport, CommandRecord
+from iveg.domain.records import CommandRecord
 from iveg.vital.record import ODOMETRY_PERIOD_S
 
 
@@ -152,31 +152,9 @@ def confidence_counts(
 MOST_STOPS = 2000
 
 
-@dataclass(frozen=True, slots=True)
-class CommandLatency:
-    """Times of one STOP from the press (ms); None where a step never came.
-
-    Without a told press, the press is when it was accepted.
-
-    Attributes:
-        answer_ms: To the robot's answer by each transport that brought one.
-        standstill_ms: To the first standing sample.
-        accepted_ms: To this server, where the page told when it was pressed.
-        sent_ms: Until it left by each transport that took it.
-    """
-
-    command_id: str
-    robot_id: str
-    requested_at: float
-    answer_ms: ByTransport
-    sent_ms: ByTransport
-    standstill_ms: float | None
-    accepted_ms: float | None = None
-
-
-def command_latencies(
+def newest_stops(
     connection: Connection, since: float, until: float, robot: str | None = None
-) -> tuple[CommandLatency, ...]:
+) -> tuple[CommandRecord, ...]:
     """The newest STOPs of ``since <= requested_at < until``, oldest first."""
     c = commands.c
     statement = (
@@ -188,25 +166,7 @@ def command_latencies(
     if robot is not None:
         statement = statement.where(c.robot_id == robot)
     rows = connection.execute(statement).mappings().all()
-    return tuple(_latency(record_of(CommandRecord, row)) for row in reversed(rows))
-
-
-def _latency(record: CommandRecord) -> CommandLatency:
-    pressed = record.pressed_at
-    asked = record.requested_at if pressed is None else pressed
-    return CommandLatency(
-        record.command_id,
-        record.robot_id,
-        record.requested_at,
-        {one: _ms(asked, at) for one, at in record.answer_at.items()},
-        {one: _ms(asked, at) for one, at in record.sent_at.items()},
-        record.standstill_ms,
-        None if pressed is None else _ms(pressed, record.requested_at),
-    )
-
-
-def _ms(start: float, end: float) -> float:
-    return 1000.0 * (end - start)
+    return tuple(record_of(CommandRecord, row) for row in reversed(rows))
 
 
 def poses_of(connection: Connection, since: float, until: float) -> tuple[Pose, ...]:

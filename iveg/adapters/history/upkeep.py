@@ -1,19 +1,21 @@
 """Upkeep of the history: rows whose time is over go, in pieces of one transaction each.
 
-Beside it stands what the history holds: its size, its days, and what of a day is gone.
+Once a minute the disk is looked at, too: where it is low, people are told, and the
+oldest recordings of inputs go before their time.
 """
 
 import asyncio
-from collections.abc import Callable, Coroutine, Iterator, Mapping
-from contextlib import contextmanager
+from collections import Counter
+from collections.abc import Awaitable, Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 from sqlalchemy import (
     ColumnElement,
     Connection,
-    Integer,
     Table,
     TextClause,
     and_,
@@ -39,8 +41,15 @@ from iveg.adapters.history.tables import (
     metadata,
     odometry,
 )
+from iveg.domain.audit import ITSELF
 from iveg.domain.errors import HopError
-from iveg.domain.retention import DAY_S, DiskSpace, PurgeStep
+from iveg.domain.events import LogEvent
+from iveg.domain.observations import Instant
+from iveg.domain.retention import DAY_S, PURGE_STEPS, DiskSpace, PurgeStep, Retention
+from iveg.vital.audit import AuditTrail
+from iveg.vital.event_log import EventLog
+from iveg.vital.ports import Clock
+from iveg.vital.supervision import Supervision
 
 PIECE = 10_000
 """Rows of one transaction; more where many are of one moment."""
@@ -154,43 +163,134 @@ def recorded_days(connection: Connection, most: int) -> tuple[int, ...]:
     return tuple(days)
 
 
-class RecordedHistory:
-    """Implements ``pipeline.retention.RetainedHistory``.
+# --- once a day, and once a minute ----------------------------------------------------
+
+PART = "retention"
+LOOK_S = 60.0
+SETTLES_S = 300.0
+"""A server that has just started has other things to do."""
+PAUSE_S = 0.1
+"""Between two pieces: rows that wait to be written come in between."""
+
+
+class DiskWatch:
+    """Tells people of a disk that is low, and has the oldest recordings go.
+
+    Args:
+        directory: Of the data, whose disk is watched.
+        drop_recording: Deletes the oldest recording of inputs, if there is one.
+        supervision: Told of a disk that is low.
+        read_space: Room on the disk of a directory.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        drop_recording: Callable[[], Awaitable[bool]],
+        supervision: Supervision,
+        read_space: Callable[[Path], DiskSpace] = disk_space,
+    ) -> None:
+        self.deleted = 0
+        """Recordings since the start."""
+        self._directory = directory
+        self._drop_recording = drop_recording
+        self._supervision = supervision
+        self._read_space = read_space
+        self._is_low = False
+
+    async def look(self) -> None:
+        """Look at the disk.  Raises HopError: it cannot be read."""
+        try:
+            space = await asyncio.to_thread(self._read_space, self._directory)
+        except OSError as error:
+            raise HopError("disk", error.strerror or str(error)) from error
+        self._supervision.report(PART, space.conditions(was_low=self._is_low))
+        self._is_low = space.is_low(was_low=self._is_low)
+        if self._is_low and await self._drop_recording():
+            self.deleted += 1
+
+
+class HistoryUpkeep:
+    """Has rows leave the history when their time is over, once a day (UTC).
 
     Args:
         recorder: The one writer.
         queries: Its reading side.
-        directory: Of the data, whose disk is watched.
-        drop_recording: Deletes the oldest recording of inputs, if there is one.
-        read_space: Room on the disk of a directory.
+        retention: Days that each kind of row is kept.
+        event_log: Gets a line a day.
+        trail: Told what was deleted.
+        disk: Looked at once a minute.
     """
 
     def __init__(
         self,
         recorder: Recorder,
         queries: Queries,
-        directory: Path,
-        drop_recording: Callable[[], Coroutine[object, object, bool]],
-        read_space: Callable[[Path], DiskSpace] = disk_space,
+        retention: Retention,
+        event_log: EventLog,
+        trail: AuditTrail,
+        disk: DiskWatch,
     ) -> None:
         self._recorder = recorder
-        self._directory = directory
-        self._read_space = read_space
-        self.recorded_days = lambda most: queries.ask(recorded_days, most)
-        self.drop_recording = drop_recording
+        self._queries = queries
+        self._retention = retention
+        self._event_log = event_log
+        self._trail = trail
+        self._disk = disk
+        self._rows: Counter[str] = Counter()
+        self._settled_at: float | None = None
+        self._purged_day: int | None = None
 
-    async def purge(self, step: PurgeStep, before: float) -> int:
-        """One piece of a step, of rows older than this (Unix s); number of rows."""
-        return await self._recorder.between_batches(
-            lambda connection: purge_piece(connection, step, before)
-        )
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """Rows deleted and unplaced, and recordings deleted, since the start."""
+        rows = {f"history_{done}": count for done, count in self._rows.items()}
+        return rows | {"recordings_deleted": self._disk.deleted}
 
-    async def disk_space(self) -> DiskSpace:
-        """Room on the disk of the data."""
-        try:
-            return await asyncio.to_thread(self._read_space, self._directory)
-        except OSError as error:
-            raise HopError("disk", error.strerror or str(error)) from error
+    async def run(self, clock: Clock) -> None:
+        """Until cancelled."""
+        while True:
+            # A database that is away is the recorder's to report.
+            with suppress(HopError):
+                await self._disk.look()
+                await self.look(clock())
+            await asyncio.sleep(LOOK_S)
+
+    async def look(self, now: Instant) -> None:
+        """Purge where that is due.  Raises HopError: the database is away."""
+        if self._settled_at is None:
+            self._settled_at = now.mono + SETTLES_S
+        day = int(now.wall // DAY_S)
+        if now.mono >= self._settled_at and day != self._purged_day:
+            await self._purge(now)
+            # Where the database fails before, the day is taken up at the next look.
+            self._purged_day = day
+
+    async def _purge(self, now: Instant) -> None:
+        recorded = await self._queries.ask(recorded_days, self._retention.longest)
+        cutoffs = self._retention.cutoffs(now.wall, recorded)
+        slots = {"deleted": 0, "unplaced": 0}
+        for step in PURGE_STEPS:
+            if step.kind not in cutoffs:
+                continue
+            before = cutoffs[step.kind]
+            done = "unplaced" if step.kind == "positions" else "deleted"
+            if rows := await self._take(step, before):
+                slots[done] += rows
+                details = {"rows": rows, "before": before}
+                self._trail.note(ITSELF, done, step.table, details, at=now)
+        self._rows.update(slots)
+        # By this line a day is recorded also where nothing else happens.
+        self._event_log.log(LogEvent("system", "log.history_kept", slots), now)
+
+    async def _take(self, step: PurgeStep, before: float) -> int:
+        """All rows of a step, a piece after the other; their number."""
+        rows = 0
+        piece = partial(purge_piece, step=step, before=before)
+        while took := await self._recorder.between_batches(piece):
+            rows += took
+            await asyncio.sleep(PAUSE_S)
+        return rows
 
 
 # --- size ----
@@ -212,16 +312,12 @@ class TableStats:
 
 def read_stats(connection: Connection) -> tuple[list[TableStats], int]:
     """Rows of each table, and the size of all (bytes); reads all of it."""
-    found = []
+    found: list[TableStats] = []
     for name, at in AGES.items():
         measured = select(func.count(), func.min(at), func.max(at))
         found.append(TableStats(name, *connection.execute(measured).one()))
     if connection.dialect.name == "postgresql":
-        size = select(func.pg_database_size(func.current_database()))
+        size = "SELECT pg_database_size(current_database())"
     else:
-        pages = text(
-            "SELECT page_count * page_size AS size FROM"
-            " pragma_page_count, pragma_page_size"
-        )
-        size = pages.columns(size=Integer)
-    return found, connection.scalar(size) or 0
+        size = "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size"
+    return found, int(connection.scalar(text(size)) or 0)

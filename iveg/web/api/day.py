@@ -14,16 +14,14 @@ from iveg.adapters.history.lists import (
     DECISIONS,
     MOST_ROWS,
     Filter,
-    ListOf,
-    R,
 )
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.series import (
     AIR,
     EQUIPMENT,
     SPEEDS,
-    command_latencies,
     confidence_counts,
+    newest_stops,
     people_seen,
     poses_of,
     series_of,
@@ -41,6 +39,7 @@ from iveg.domain.errors import HopError
 from iveg.domain.fleet import FleetDescription, as_counted
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
+from iveg.domain.records import DecisionRecord
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import GreenhouseMap, Point, write_json
 from iveg.models.command import Command
@@ -93,7 +92,7 @@ def add_routes(
         found = await asyncio.gather(
             queries.ask(series_of, SPEEDS, since, until, asked.robot),
             queries.ask(confidence_counts, since, until, asked.robot),
-            queries.ask(command_latencies, since, until, asked.robot),
+            queries.ask(newest_stops, since, until, asked.robot),
         )
         draw = charts.history_figures
         return await figures(draw, since, until, *found, threshold(), fleet)
@@ -187,8 +186,8 @@ def _joined(followed: Command | None, kept: Command | None) -> Command | None:
 
 
 _DAY = timedelta(days=1)
-_MOST_RECORDS = 20 * MOST_ROWS
-"""So many are read of a day; one with more is told by those."""
+_MOST_DECISIONS = 20 * MOST_ROWS
+"""So many are read; a day with more is told by those."""
 ReadDay = Callable[[date, float], Awaitable[Day]]
 """Has one day read from the history, as far as it has gone (Unix s)."""
 
@@ -209,9 +208,8 @@ async def _read(queries: Queries, greenhouse: Greenhouse, day: date, now: float)
     poses = await queries.ask(poses_of, since, until)
     seen = await queries.ask(people_seen, since, until)
     worked = worked_minutes(poses, greenhouse)
-    decisions = await _records(queries, DECISIONS, since, until)
-    orders = await _records(queries, COMMANDS, since, until)
-    stops = [one for one in reversed(orders) if one.kind == "stop"]
+    decisions = await _decisions(queries, since, until)
+    stops = await queries.ask(newest_stops, since, until)
     slowed = slowed_minutes(decisions, greenhouse, until)
     by_name = [
         Worked(lane=lane, robot_id=robot, minutes=robots[robot])
@@ -238,14 +236,15 @@ async def _read(queries: Queries, greenhouse: Greenhouse, day: date, now: float)
     )
 
 
-async def _records(
-    queries: Queries, listed: ListOf[R], since: float, until: float
-) -> list[R]:
+async def _decisions(
+    queries: Queries, since: float, until: float
+) -> list[DecisionRecord]:
     wanted = Filter(since=since, until=until, limit=MOST_ROWS)
-    found: list[R] = []
-    async for page in queries.pages(listed, await queries.page(listed, wanted), wanted):
+    pages = queries.pages(DECISIONS, await queries.page(DECISIONS, wanted), wanted)
+    found: list[DecisionRecord] = []
+    async for page in pages:
         found += page
-        if len(found) >= _MOST_RECORDS:
+        if len(found) >= _MOST_DECISIONS:
             break
     return found
 

@@ -14,10 +14,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.adapters.history.series import CONFIDENCE_BINS, CommandLatency, Series
+from iveg.adapters.history.series import CONFIDENCE_BINS, Series
 from iveg.domain.feedback import FULL_SPEED
 from iveg.domain.fleet import FleetDescription, as_counted
 from iveg.domain.latency import DATA, Cell, Segment, Sketch
+from iveg.domain.records import CommandRecord
 from iveg.domain.transports import TRANSPORTS
 from iveg.vital.record import ODOMETRY_PERIOD_S
 
@@ -97,22 +98,22 @@ def confidence_figure(
     return figure_of(traces, ("confidence", "count"), layout)
 
 
-def stop_figure(latencies: Sequence[CommandLatency]) -> bytes:
+def stop_figure(stops: Sequence[CommandRecord]) -> bytes:
     """Times of each STOP (ms): to each transport's answer, and to standing."""
     kinds: dict[str, list[float | None]] = {
-        transport.id: [one.answer_ms.get(transport.id) for one in latencies]
+        transport.id: [one.answer_ms.get(transport.id) for one in stops]
         for transport in TRANSPORTS
     }
-    kinds["standstill"] = [one.standstill_ms for one in latencies]
+    kinds["standstill"] = [one.standstill_ms for one in stops]
     traces = [
         {
             "type": "scatter",
             "mode": "markers",
             "name": kind,
             "meta": {"kind": kind},
-            "x": _times(one.requested_at for one in latencies),
+            "x": _times(one.requested_at for one in stops),
             "y": took,
-            "text": [one.robot_id for one in latencies],
+            "text": [one.robot_id for one in stops],
         }
         for kind, took in kinds.items()
         if any(one is not None for one in took)
@@ -142,7 +143,7 @@ def cdf_figure(sketches: Mapping[Cell, Sketch]) -> bytes:
 def history_figures(
     speeds: Lines,
     counts: Mapping[str, Counter[int]],
-    stops: Sequence[CommandLatency],
+    stops: Sequence[CommandRecord],
     threshold: float | None,
     fleet: FleetDescription,
 ) -> dict[str, bytes]:

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, Store
 from iveg.adapters.history.series import SPEEDS, people_seen, series_of
 from iveg.adapters.history.tables import TABLE_MAPPINGS
-from iveg.adapters.history.upkeep import RecordedHistory, purge_piece, recorded_days
+from iveg.adapters.history.upkeep import purge_piece, recorded_days
 from iveg.adapters.journal import FileJournal
 from iveg.domain.records import ReadingRecord, Record
 from iveg.domain.retention import DAY_S, PURGE_STEPS, PurgeStep
@@ -221,14 +222,14 @@ async def test_a_purge_beside_recording_loses_no_row(
     write(database_url, [odometry_record(at=OLD + n / 10) for n in range(1000)])
     recorder = Recorder(database_url, FileJournal(tmp_path / "journal"))
     writing = asyncio.create_task(recorder.run())
-    history = RecordedHistory(recorder, queries, tmp_path, _no_recording)
+    piece = partial(purge_piece, step=PurgeStep("telemetry", "odometry"), before=NOON)
     taken, recorded = 0, 0
 
     while True:
         for _ in range(20):
             recorder.enqueue(odometry_record(at=NOON + recorded))
             recorded += 1
-        rows = await history.purge(PurgeStep("telemetry", "odometry"), NOON)
+        rows = await recorder.between_batches(piece)
         taken += rows
         if not rows:
             break
@@ -250,7 +251,3 @@ def test_days_of_the_log_are_found_newest_first(
 
     assert asyncio.run(queries.ask(recorded_days, 3)) == (4000, 7, 1)
     assert asyncio.run(queries.ask(recorded_days, 99)) == (4000, 7, 1, 0)
-
-
-async def _no_recording() -> bool:
-    return False
