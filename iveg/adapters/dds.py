@@ -46,58 +46,18 @@ from iveg.ros2.names import Endpoint, Qos, dds_topic, dds_type, ros_topic, ros_t
 _PLAIN = {"bool": bool, "string": str}
 
 
-def _leave_in_bytes(kind: type[IdlStruct]) -> None:
-    """Let samples of a type of ours stay bytes: ``iveg.ros2.cdr`` reads them.
+@cache
+def announced(store: Any, ros: str) -> type[IdlStruct]:
+    """The type that DDS announces for a message, with all within it.
 
-    Cyclone's reader and writer ask a type to deserialize and serialize its samples, and
-    a base of ours would be announced with it.
+    Its samples stay bytes: Cyclone's reader and writer ask a type to deserialize and
+    serialize them, and a base of ours would be announced with it.
     """
-
-    def deserialize(cls: type[IdlStruct], data: bytes, /, **_: object) -> IdlStruct:
-        made = cls()
-        made.payload = data
-        return made
-
-    kind.deserialize = classmethod(deserialize)
-    kind.deserialize_key = classmethod(deserialize)
-    kind.serialize = lambda sample, **_: sample.payload
-
-
-@cache
-def announced(message: type[Message]) -> type[IdlStruct]:
-    """The type that DDS announces for a message."""
-    return structure(message.STORE, message.ROS, _in_bytes)
-
-
-def _in_bytes(ros: str, members: dict[str, object]) -> type[IdlStruct]:
-    kind = struct_of(ros, members, dataclassify=False)
-    _leave_in_bytes(kind)
-    return kind
-
-
-def struct_of(
-    ros: str, members: dict[str, object], *, dataclassify: bool = True
-) -> type[IdlStruct]:
-    """A type in Cyclone's words, by its ROS name."""
-    typename = dds_type(ros).replace("::", ".")
-    name = ros.rpartition("/")[2]
-    kind: type[IdlStruct] = make_idl_struct(
-        name, typename, members, dataclassify=dataclassify
-    )
-    return kind
-
-
-_Make = Callable[[str, dict[str, object]], type[IdlStruct]]
-
-
-@cache
-def structure(store: Any, ros: str, make: _Make) -> type[IdlStruct]:
-    """A type of the store, with all within it; ``make`` is given name and members."""
 
     def idl(kind: Any) -> Any:
         match kind:
             case (Nodetype.NAME, nested):
-                return structure(store, nested, make)
+                return announced(store, nested)
             case (Nodetype.SEQUENCE, (inner, _)):
                 return types.sequence[idl(inner)]
             case (Nodetype.ARRAY, (inner, count)):
@@ -105,8 +65,19 @@ def structure(store: Any, ros: str, make: _Make) -> type[IdlStruct]:
             case (_, (name, _)):
                 return _PLAIN.get(name) or getattr(types, name)
 
+    def deserialize(cls: type[IdlStruct], data: bytes, /, **_: object) -> IdlStruct:
+        made = cls()
+        made.payload = data
+        return made
+
     _, fields = store.fielddefs[ros]
-    return make(ros, {name: idl(kind) for name, kind in fields})
+    members = {name: idl(kind) for name, kind in fields}
+    typename, name = dds_type(ros).replace("::", "."), ros.rpartition("/")[2]
+    kind: type[IdlStruct] = make_idl_struct(name, typename, members, dataclassify=False)
+    kind.deserialize = classmethod(deserialize)
+    kind.deserialize_key = classmethod(deserialize)
+    kind.serialize = lambda sample, **_: sample.payload
+    return kind
 
 
 def write_qos(qos: Qos) -> DdsQos:
@@ -156,8 +127,6 @@ def user_data_of(qos: DdsQos) -> tuple[str, str]:
 # A subscription and a publication of DDS: raw payloads in and out.
 
 MOST_TAKEN = 200
-_FEW = 8
-"""Cyclone makes room for as many as are asked for, and mostly one waits."""
 
 
 def _count(matched: Callable[[], list[int]]) -> int:
@@ -173,8 +142,9 @@ def _count(matched: Callable[[], list[int]]) -> int:
 class DdsReader:
     """A subscription."""
 
-    def __init__(self, reader: DataReader) -> None:
+    def __init__(self, reader: DataReader, depth: int) -> None:
         self._reader: DataReader | None = reader
+        self._depth = depth
 
     def take(self) -> list[bytes]:
         """Every waiting message, oldest first.
@@ -182,17 +152,11 @@ class DdsReader:
         Raises:
             HopError: DDS refuses.
         """
-        found = self._take(_FEW)
-        if len(found) == _FEW:
-            found += self._take(MOST_TAKEN)
-        return [one.payload for one in found if one.sample_info.valid_data]
-
-    def _take(self, most: int) -> list[IdlStruct]:
         try:
-            found: list[IdlStruct] = self.entity.take(most)
+            found = self.entity.take(self._depth)
         except DDSException as error:
             raise HopError("dds", error.msg) from error
-        return found
+        return [sample.payload for sample in found if sample.sample_info.valid_data]
 
     @property
     def entity(self) -> DataReader:
@@ -309,7 +273,7 @@ class Dds(AbstractContextManager["Dds"]):
         """Subscribe to a topic by its full ROS name."""
         policies = self._policies(message, qos)
         topic = self._topic(name, message)
-        made = DdsReader(DataReader(self._participant, topic, policies))
+        made = DdsReader(DataReader(self._participant, topic, policies), qos.depth)
         self._own.append(made)
         return made
 
@@ -326,7 +290,7 @@ class Dds(AbstractContextManager["Dds"]):
         return DdsQos(data, base=write_qos(qos))
 
     def _topic(self, name: str, message: type[Message]) -> Topic:
-        kind = announced(message)
+        kind = announced(message.STORE, message.ROS)
         if (name, kind) not in self._topics:
             made = Topic(self._participant, dds_topic(name), kind)
             self._topics[name, kind] = made

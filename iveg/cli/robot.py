@@ -26,20 +26,21 @@ from iveg.domain.fleet import (
     is_robot_id,
 )
 from iveg.domain.witness import Plan
-from iveg.robot.ros2.checking import CheckRow, forms_published, judge, lines
+from iveg.ngsi import names
+from iveg.robot.ros2.checking import CheckRow, judge, lines
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.inputs import SensorInputs
+from iveg.robot.ros2.inputs import SensorInputs, Subscriptions
 from iveg.robot.ros2.outputs import Network
 from iveg.robot.ros2.rig import Ros2Robot
-from iveg.robot.ros2.topics import TOPICS, sensed_topics
 from iveg.ros2 import cdr
 from iveg.ros2.messages import Message
 from iveg.settings import Settings
 
 if TYPE_CHECKING:
-    from iveg.adapters.dds import Dds, DdsReader
+    pass
 
 _CHECK_S = 4.0
+_CHECK_DEPTH = 200
 
 
 async def check(
@@ -56,20 +57,18 @@ async def check(
     fleet = load_fleet(settings.fleet, settings.robots)
     address = broker_of(settings)
     with Dds(network) as dds:
-        readers: dict[tuple[str, type[Message]], DdsReader] = {}
+        subscriptions = Subscriptions(config, dds, _CHECK_DEPTH)
         link = MqttLink(address, f"check of {robot_id}")
         task = asyncio.create_task(link.run(), name="broker")
         began = clock.mono()
         while clock.mono() - began < _CHECK_S:
-            _listen(dds, config, readers)
+            subscriptions.meet(dds.endpoints())
             await asyncio.sleep(0.03)
             now = clock.now()
-            for (topic, kind), reader in readers.items():
-                if waited := reader.take():
-                    form = TOPICS[topic].form(kind.ROS) or kind
-                    counts[topic] += len(waited)
-                    frames[topic] = _frame(form, waited[-1])
-                    inputs.hear(topic, waited, now.mono, form)
+            for topic, form, waited in subscriptions.take():
+                counts[topic] += len(waited)
+                frames[topic] = _frame(form, waited[-1])
+                inputs.hear(topic, waited, now.mono, form)
             inputs.tick(now)
         broker = link.connected
         task.cancel()
@@ -100,21 +99,6 @@ def _frame(form: type[Message], payload: bytes) -> str:
     except UnreadableError:
         return ""
     return "" if header is None else str(header.frame_id)
-
-
-def _listen(
-    dds: "Dds",
-    config: RobotConfig,
-    readers: "dict[tuple[str, type[Message]], DdsReader]",
-) -> None:
-    """Read each topic that is published, in its type."""
-    endpoints = dds.endpoints()
-    for topic, name in sensed_topics(config.full_topics).items():
-        depth = 2 if TOPICS[topic].role == "picture" else 200
-        qos = config.quality(topic).newest(depth)
-        for form in forms_published(topic, name, endpoints):
-            if (topic, form) not in readers:
-                readers[topic, form] = dds.reader(name, form, qos)
 
 
 def run(call: CommandCall) -> int:

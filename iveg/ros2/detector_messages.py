@@ -1,10 +1,10 @@
-"""Messages of detectors beside ``vision_msgs``."""
+"""Messages of detectors beside ``vision_msgs``, by their short names."""
 
 from typing import Any
 
-from iveg.ros2.messages import NEWER_STORE, message
+from iveg.ros2.messages import NEWER_STORE, message, short_named
 
-BoundingBox: Any = message("bboxes_ex_msgs/msg/BoundingBox")
+_PACKAGES = "yolo_msgs", "bboxes_ex_msgs", "gb_visual_detection_3d_msgs"
 NumberedBoundingBox: Any = message("bboxes_ex_msgs/msg/BoundingBox", NEWER_STORE)
 NumberedBoundingBoxes: Any = message("bboxes_ex_msgs/msg/BoundingBoxes", NEWER_STORE)
 """Boxes of one picture as since July 2022."""
@@ -12,12 +12,9 @@ BoundingBoxes: Any = message(
     "bboxes_ex_msgs/msg/BoundingBoxes", newer=NumberedBoundingBoxes
 )
 """Boxes of one picture; YOLOX-ROS puts the picture's header into ``header``."""
-BoundingBox3d: Any = message("gb_visual_detection_3d_msgs/msg/BoundingBox3d")
-BoundingBoxes3d: Any = message("gb_visual_detection_3d_msgs/msg/BoundingBoxes3d")
-Point2D: Any = message("yolo_msgs/msg/Point2D")
-Vector2: Any = message("yolo_msgs/msg/Vector2")
-Pose2D: Any = message("yolo_msgs/msg/Pose2D")
-BoundingBox2D: Any = message("yolo_msgs/msg/BoundingBox2D")
-BoundingBox3D: Any = message("yolo_msgs/msg/BoundingBox3D")
-Detection: Any = message("yolo_msgs/msg/Detection")
-DetectionArray: Any = message("yolo_msgs/msg/DetectionArray")
+
+
+def __getattr__(name: str) -> Any:
+    """The class of a message by its short name, made at its first use."""
+    made = globals()[name] = short_named(name, _PACKAGES)
+    return made

@@ -5,6 +5,7 @@ Names and fields are those of ROS, in ROS's order; units are those of REP-103.
 
 import math
 from abc import ABC
+from collections.abc import Iterable
 from dataclasses import dataclass, field, make_dataclass
 from functools import partial
 from typing import Any, ClassVar
@@ -170,40 +171,26 @@ def definitions(message: type[Message]) -> tuple[type[Message], ...]:
 
 # --- messages ---------------------------------------------------------------------
 
-Header: Any = message("std_msgs/msg/Header")
-Duration: Any = message("builtin_interfaces/msg/Duration")
-ColorRGBA: Any = message("std_msgs/msg/ColorRGBA")
-Point: Any = message("geometry_msgs/msg/Point")
-Vector3: Any = message("geometry_msgs/msg/Vector3")
-Quaternion: Any = message("geometry_msgs/msg/Quaternion")
-Pose: Any = message("geometry_msgs/msg/Pose")
-PoseStamped: Any = message("geometry_msgs/msg/PoseStamped")
-PoseWithCovariance: Any = message("geometry_msgs/msg/PoseWithCovariance")
-Twist: Any = message("geometry_msgs/msg/Twist")
-TwistStamped: Any = message("geometry_msgs/msg/TwistStamped")
-TwistWithCovariance: Any = message("geometry_msgs/msg/TwistWithCovariance")
-Transform: Any = message("geometry_msgs/msg/Transform")
-TransformStamped: Any = message("geometry_msgs/msg/TransformStamped")
-TFMessage: Any = message("tf2_msgs/msg/TFMessage")
-Odometry: Any = message("nav_msgs/msg/Odometry")
-Path: Any = message("nav_msgs/msg/Path")
-MapMetaData: Any = message("nav_msgs/msg/MapMetaData")
-OccupancyGrid: Any = message("nav_msgs/msg/OccupancyGrid")
-LaserScan: Any = message("sensor_msgs/msg/LaserScan")
-BatteryState: Any = message("sensor_msgs/msg/BatteryState")
-Image: Any = message("sensor_msgs/msg/Image")
-CameraInfo: Any = message("sensor_msgs/msg/CameraInfo")
-PointField: Any = message("sensor_msgs/msg/PointField")
-PointCloud2: Any = message("sensor_msgs/msg/PointCloud2")
-Marker: Any = message("visualization_msgs/msg/Marker")
-MarkerArray: Any = message("visualization_msgs/msg/MarkerArray")
-ObjectHypothesis: Any = message("vision_msgs/msg/ObjectHypothesis")
-ObjectHypothesisWithPose: Any = message("vision_msgs/msg/ObjectHypothesisWithPose")
-BoundingBox3D: Any = message("vision_msgs/msg/BoundingBox3D")
-Detection3D: Any = message("vision_msgs/msg/Detection3D")
-Detection3DArray: Any = message("vision_msgs/msg/Detection3DArray")
-Point2D: Any = message("vision_msgs/msg/Point2D")
+_PACKAGES = (
+    *("std_msgs", "geometry_msgs", "nav_msgs", "sensor_msgs", "tf2_msgs"),
+    *("builtin_interfaces", "visualization_msgs", "vision_msgs"),
+)
 PicturePose: Any = message("vision_msgs/msg/Pose2D")
-BoundingBox2D: Any = message("vision_msgs/msg/BoundingBox2D")
-Detection2D: Any = message("vision_msgs/msg/Detection2D")
-Detection2DArray: Any = message("vision_msgs/msg/Detection2DArray")
+
+
+def short_named(name: str, packages: Iterable[str]) -> Any:
+    """The class of a message in one of these packages.
+
+    Raises:
+        AttributeError: no such message.
+    """
+    for package in packages:
+        if (ros := f"{package}/msg/{name}") in STORE.fielddefs:
+            return message(ros)
+    raise AttributeError(f"no message {name} in {', '.join(packages)}")
+
+
+def __getattr__(name: str) -> Any:
+    """The class of a message by its short name, made at its first use."""
+    made = globals()[name] = short_named(name, _PACKAGES)
+    return made

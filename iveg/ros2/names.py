@@ -33,6 +33,11 @@ class Qos:
             offered.transient_local or not self.transient_local
         )
 
+    def __str__(self) -> str:
+        """As ``iveg robot check`` prints it."""
+        kept = ", kept" if self.transient_local else ""
+        return ("reliable" if self.reliable else "best effort") + kept
+
     def newest(self, depth: int = 1) -> "Qos":
         """This quality of service with another depth."""
         return replace(self, depth=depth)
@@ -59,6 +64,10 @@ class Endpoint:
     own: bool
     type_hash: str = ""
     gate: str = ""
+
+    def writes_to(self, topic: str) -> bool:
+        """Whether it is a writer of this topic."""
+        return self.writes and self.topic == topic
 
 
 DEFAULT = Qos()

@@ -69,5 +69,8 @@ class FakeNetwork:
         return self.others
 
     def publish(self, topic: str, message: Message, times: int = 1) -> None:
-        """Somebody else publishes."""
+        """Somebody else publishes, and stays."""
+        writer = endpoint(topic, type(message))
+        if writer not in self.others:
+            self.others.append(writer)
         self.readers[topic].waiting += [cdr.write(message)] * times

@@ -1,7 +1,8 @@
 """Faults that endpoints on DDS give away: of a running gate, and ``robot check``."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from iveg.domain.observations import RobotFault
@@ -40,35 +41,31 @@ class Lookout:
 
     def look(self, endpoints: Iterable[Endpoint], now: float) -> None:
         """Judge the endpoints of this moment."""
-        others = [one for one in endpoints if not one.own]
-        out = self._names["cmd_vel_out"]
-        if any(one.writes and one.topic == out for one in others):
-            self._input_faults.note("second_publisher", out, now)
-        self._note_unheard(others, now)
-        self._note_types(others, now)
+        for code, about in self._faults([one for one in endpoints if not one.own], now):
+            self._input_faults.note(code, about, now)
 
-    def _note_unheard(self, others: Sequence[Endpoint], now: float) -> None:
-        """A base that cannot hear the gate obeys no STOP either."""
-        out = self._names["cmd_vel_out"]
+    def _faults(
+        self, others: Sequence[Endpoint], now: float
+    ) -> Iterator[tuple[str, str]]:
+        """Code of each fault, and its topic."""
+        out, offered = self._names["cmd_vel_out"], self._config.quality("cmd_vel_out")
+        at_drive = [end for end in others if end.topic == out]
+        if any(end.writes for end in at_drive):
+            yield "second_publisher", out
+        # A base that cannot hear the gate obeys no STOP either.
+        readers = [end for end in at_drive if not end.writes]
         message = message_of(stamped=self._config.drive.stamped_out)
-        offered = self._config.quality("cmd_vel_out")
-        readers = [one for one in others if one.topic == out and not one.writes]
         for reader in readers:
-            why = deafness(reader, message, offered)
-            if why:
-                self._input_faults.note("drive_unheard", f"{out}: {why}", now)
+            if why := deafness(reader, message, offered):
+                yield "drive_unheard", f"{out}: {why}"
         if readers:
             self._unheard_since = now
         elif now - self._unheard_since > _MET_WITHIN_S:
-            self._input_faults.note("drive_unheard", out, now)
-
-    def _note_types(self, others: Sequence[Endpoint], now: float) -> None:
+            yield "drive_unheard", out
         for topic, name in sensed_topics(self._names).items():
-            kinds = {one.type for one in others if one.writes and one.topic == name}
-            for kind in kinds:
+            for kind in {end.type for end in others if end.writes_to(name)}:
                 if TOPICS[topic].form(kind) is None:
-                    about = f"{name}: {kind.replace('/msg/', '/')}"
-                    self._input_faults.note("wrong_type", about, now)
+                    yield "wrong_type", f"{name}: {kind.replace('/msg/', '/')}"
 
 
 def deafness(reader: Endpoint, message: type[Message], offered: Qos) -> str:
@@ -84,23 +81,6 @@ def deafness(reader: Endpoint, message: type[Message], offered: Qos) -> str:
 
 def _short(ros_type: str) -> str:
     return ros_type.rpartition("/")[2]
-
-
-def forms_published(
-    topic: str, name: str, endpoints: Iterable[Endpoint]
-) -> list[type[Message]]:
-    """Types in which others publish a topic (key and full name), of those read."""
-    published = {
-        one.type
-        for one in endpoints
-        if one.writes and not one.own and one.topic == name
-    }
-    return [
-        kind
-        for form in TOPICS[topic].forms
-        if form.ROS in published
-        for kind in definitions(form)
-    ]
 
 
 # --- checking ---------------------------------------------------------------------
@@ -152,47 +132,46 @@ def judge(
         has_detector: The fleet file says so.
     """
     names = config.full_topics
-    others = [one for one in endpoints if not one.own and one.gate != robot_id]
+    others = [end for end in endpoints if not end.own and end.gate != robot_id]
     noted = InputFaults()
     Lookout(config, noted, -math.inf).look(others, 0.0)
-    verdicts: dict[str, list[str]] = {}
+    verdicts: defaultdict[str, list[str]] = defaultdict(list)
     for fault in (*faults, *noted.faults(0.0)):
         about, _, why = fault.about.partition(": ")
-        said = f"{fault.code} ({why})" if why else fault.code
-        verdicts.setdefault(about, []).append(said)
-    seen = {one.topic for one in others if one.writes}
-    needed = {"odometry", "tf", "scan", "cmd_vel_in"}
-    if has_detector and not any(names[key] in seen for key in _DETECTORS):
-        needed.add("detections_3d" if names["detections_3d"] else "detections_2d")
-    if names["detections_2d"] in seen:
-        needed |= {"depth", "camera_info"}
-    rows = []
+        verdicts[about].append(f"{fault.code} ({why})" if why else fault.code)
+    needed = _needed(names, others, has_detector=has_detector)
     drive = {key: names[key] for key in ("cmd_vel_in", "cmd_vel_out")}
+    rows = []
     for topic, name in (sensed_topics(names) | drive).items():
-        met = [one for one in others if one.topic == name]
-        ends = [one for one in met if one.writes != (topic == "cmd_vel_out")]
+        met = [end for end in others if end.topic == name]
+        ends = [end for end in met if end.writes != (topic == "cmd_vel_out")]
         rate_hz, frame = traffic.get(topic, (0.0, ""))
         said = _badness(topic, config, ends, rate_hz, topic in needed)
         if topic == "cmd_vel_in" and len(met) > len(ends):
             said = "somebody listens beside the gate: a base would go round it"
         rows.append(_row(name, ends, rate_hz, frame, said, *verdicts.pop(name, ())))
-    rows += [CheckRow(one, verdict=", ".join(said)) for one, said in verdicts.items()]
+    rows += [CheckRow(about, verdict=", ".join(v)) for about, v in verdicts.items()]
     return *rows, *_unnamed(names, others)
+
+
+def _needed(
+    names: Mapping[str, str], others: Sequence[Endpoint], *, has_detector: bool
+) -> set[str]:
+    """Keys of topics that somebody has to publish."""
+    seen = {end.topic for end in others if end.writes}
+    needed = {"odometry", "tf", "scan", "cmd_vel_in"}
+    if has_detector and not any(names[key] in seen for key in _DETECTORS):
+        needed.add("detections_3d" if names["detections_3d"] else "detections_2d")
+    if names["detections_2d"] in seen:
+        needed |= {"depth", "camera_info"}
+    return needed
 
 
 def _row(
     name: str, ends: Sequence[Endpoint], rate_hz: float, frame: str, *said: str
 ) -> CheckRow:
-    kinds = " and ".join(sorted({one.type for one in ends}))
-    qos = " and ".join(
-        sorted(
-            {
-                ("reliable" if one.qos.reliable else "best effort")
-                + (", kept" if one.qos.transient_local else "")
-                for one in ends
-            }
-        )
-    )
+    kinds = " and ".join(sorted({end.type for end in ends}))
+    qos = " and ".join(sorted({str(end.qos) for end in ends}))
     verdict = ", ".join(dict.fromkeys(filter(None, said)))
     return CheckRow(name, kinds, len(ends), rate_hz, qos, frame, verdict)
 
@@ -212,11 +191,11 @@ def _badness(
         return ""
     if topic == "cmd_vel_in" and twist.ROS not in {one.type for one in ends}:
         return f"not {twist.ROS}: drive.stamped_in"
-    for one in ends:
-        form = row.form(one.type)
-        if form and one.type_hash not in ("", *map(type_hash, definitions(form))):
-            return f"other fields: {one.type_hash} there, {type_hash(form)} here"
-        if not config.quality(topic).hears(one.qos):
+    for end in ends:
+        form = row.form(end.type)
+        if form and end.type_hash not in ("", *map(type_hash, definitions(form))):
+            return f"other fields: {end.type_hash} there, {type_hash(form)} here"
+        if not config.quality(topic).hears(end.qos):
             return f"another quality of service is asked for: qos.{topic}"
     if rate_hz < _LEAST_HZ.get(topic, 0.0):
         return "slow" if rate_hz else "silent"

@@ -7,7 +7,7 @@ more than its bytes.
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal
@@ -27,11 +27,13 @@ from iveg.robot.grounding import Grounding
 from iveg.robot.ros2 import reading
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.detections import Boxes, Camera, Places
+from iveg.robot.ros2.outputs import Network, Reader
 from iveg.robot.ros2.reading import InputFaults
-from iveg.robot.ros2.topics import ROS_SENSORS, TOPICS, RosSensor
+from iveg.robot.ros2.topics import ROS_SENSORS, TOPICS, RosSensor, sensed_topics
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as ros
-from iveg.ros2.messages import Message
+from iveg.ros2.messages import Message, definitions
+from iveg.ros2.names import Endpoint
 
 # --- stamps -----------------------------------------------------------------------
 #
@@ -60,6 +62,60 @@ class Stamps:
             return "back"
         self.newest, self.back = stamp, 0
         return "reset"
+
+
+# --- subscriptions ----------------------------------------------------------------
+
+
+class Subscriptions:
+    """Topics of a robot's sensors, read in the types in which they are published.
+
+    A reader of each type from the start would be announced, and tools of ROS refuse a
+    topic of several types.
+
+    Args:
+        config: Names and qualities of service.
+        network: DDS.
+        depth: Messages that are kept until they are taken; of transforms always all.
+    """
+
+    def __init__(self, config: RobotConfig, network: Network, depth: int = 1) -> None:
+        self._config, self._network, self._depth = config, network, depth
+        self._topics = sensed_topics(config.full_topics)
+        self._readers: dict[str, dict[type[Message], Reader]] = {
+            topic: {} for topic in self._topics
+        }
+        for topic in self._topics:
+            for form in TOPICS[topic].forms:
+                # Codecs are made before the robot drives, not when a detector joins.
+                for definition in definitions(form):
+                    definition.STORE.get_msgdef(definition.ROS)
+
+    def meet(self, endpoints: Sequence[Endpoint]) -> None:
+        """Listen to who publishes, from now on."""
+        for topic, name in self._topics.items():
+            qos, readers = self._config.quality(topic), self._readers[topic]
+            if TOPICS[topic].role != "transforms":
+                qos = qos.newest(self._depth)
+            for form in forms_published(topic, name, endpoints):
+                if form not in readers:
+                    readers[form] = self._network.reader(name, form, qos)
+
+    def take(self) -> Iterator[tuple[str, type[Message], Sequence[bytes]]]:
+        """Waiting messages of each topic, in its type, oldest first."""
+        for topic, readers in self._readers.items():
+            for form, reader in readers.items():
+                if waited := reader.take():
+                    yield topic, TOPICS[topic].form(form.ROS) or form, waited
+
+
+def forms_published(
+    topic: str, name: str, endpoints: Iterable[Endpoint]
+) -> list[type[Message]]:
+    """Types in which others publish a topic (key and full name), of those read."""
+    published = {end.type for end in endpoints if not end.own and end.writes_to(name)}
+    forms = (form for form in TOPICS[topic].forms if form.ROS in published)
+    return [definition for form in forms for definition in definitions(form)]
 
 
 # --- inputs -----------------------------------------------------------------------

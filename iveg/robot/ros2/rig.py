@@ -9,8 +9,6 @@ does publishing.
 import asyncio
 import itertools
 import logging
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 from iveg.adapters import clock
 from iveg.domain.errors import HopError
@@ -22,40 +20,27 @@ from iveg.domain.witness import Outline
 from iveg.robot.costmap import FleetCostmap
 from iveg.robot.node import NodeSettings, RobotNode, every
 from iveg.robot.ros2 import outputs
-from iveg.robot.ros2.checking import Lookout, forms_published
+from iveg.robot.ros2.checking import Lookout
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.inputs import SensorInputs
+from iveg.robot.ros2.inputs import SensorInputs, Subscriptions
 from iveg.robot.ros2.outputs import (
     CostmapTopic,
     DriveTopics,
     Network,
-    Reader,
     Writer,
     message_of,
     pose_for,
 )
 from iveg.robot.ros2.reading import speed_of
-from iveg.robot.ros2.topics import TOPICS, sensed_topics
+from iveg.robot.ros2.topics import TOPICS
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as ros
-from iveg.ros2.messages import Message, definitions
-from iveg.ros2.names import Endpoint
 
 _log = logging.getLogger(__name__)
 RATE_HZ = 30.0
 _WISH_HZ = 100.0
 _LOOK_ROUND_TICKS, _TELL_TICKS = 15, 6
 """Ticks between two checks of endpoints, and between two outputs of neighbours."""
-_ORDER = list(TOPICS)
-
-
-@dataclass(frozen=True, slots=True)
-class _Subscription:
-    """A topic by its key, and the type in which it is read."""
-
-    topic: str
-    form: type[Message]
-    reader: Reader
 
 
 class Ros2Robot:
@@ -104,14 +89,7 @@ class Ros2Robot:
 
     def _open(self, network: Network) -> None:
         quality, drive = self._config.quality, self._config.drive
-        self._subscriptions: list[_Subscription] = []
-        for topic in sensed_topics(self._names):
-            for form in TOPICS[topic].forms:
-                # Codecs are made before the robot drives, not when a detector joins.
-                for one in definitions(form):
-                    one.STORE.get_msgdef(one.ROS)
-            if len(TOPICS[topic].forms) == 1:
-                self._listen(topic, TOPICS[topic].message)
+        self._subscriptions = Subscriptions(self._config, network)
         self._wishes = network.reader(
             self._names["cmd_vel_in"],
             message_of(stamped=drive.stamped_in),
@@ -142,14 +120,6 @@ class Ros2Robot:
             self.inputs.pose,
         )
 
-    def _listen(self, topic: str, form: type[Message]) -> None:
-        quality = self._config.quality(topic)
-        # Every transform counts; of all else the newest.
-        qos = quality if TOPICS[topic].role == "transforms" else quality.newest()
-        reader = self._network.reader(self._names[topic], form, qos)
-        self._subscriptions.append(_Subscription(topic, form, reader))
-        self._subscriptions.sort(key=lambda known: _ORDER.index(known.topic))
-
     async def run(self) -> None:
         """Run until cancelled; the drive is left at rest."""
         async with asyncio.TaskGroup() as tasks:
@@ -174,10 +144,8 @@ class Ros2Robot:
 
     def _sense(self) -> None:
         now = clock.now()
-        for known in self._subscriptions:
-            if waited := known.reader.take():
-                form = TOPICS[known.topic].form(known.form.ROS)
-                self.inputs.hear(known.topic, waited, now.mono, form)
+        for topic, form, waited in self._subscriptions.take():
+            self.inputs.hear(topic, waited, now.mono, form)
         self.node.sense(*self.inputs.tick(now))
         self._judge(now.mono)
 
@@ -205,25 +173,10 @@ class Ros2Robot:
             self.node.request_twist(wish)
 
     def _look_round(self) -> None:
-        """Check the endpoints of others, and listen to detectors that have joined."""
+        """Check the endpoints of others, and listen to those that have joined."""
         endpoints = self._network.endpoints()
         self._lookout.look(endpoints, clock.mono())
-        self._meet_detectors(endpoints)
-
-    def _meet_detectors(self, endpoints: Sequence[Endpoint]) -> None:
-        """Listen to a detector in the type in which it publishes.
-
-        A reader of each type from the start would be announced, and tools of ROS refuse
-        a topic of several types.
-        """
-        for topic, name in sensed_topics(self._names).items():
-            if len(TOPICS[topic].forms) == 1:
-                continue
-            known = {one.form for one in self._subscriptions if one.topic == topic}
-            for form in forms_published(topic, name, endpoints):
-                if form not in known:
-                    _log.info("%s: %s comes as %s", self._id, name, form.ROS)
-                    self._listen(topic, form)
+        self._subscriptions.meet(endpoints)
 
     # --- out ----------------------------------------------------------------------
 

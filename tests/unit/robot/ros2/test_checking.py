@@ -8,11 +8,11 @@ from iveg.domain.observations import RobotFault
 from iveg.robot.ros2.checking import (
     CheckRow,
     Lookout,
-    forms_published,
     judge,
     lines,
 )
 from iveg.robot.ros2.config import DriveConfig, QualityTable, RobotConfig
+from iveg.robot.ros2.inputs import forms_published
 from iveg.robot.ros2.reading import InputFaults, speed_of
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as ros
