@@ -97,12 +97,6 @@ async def test_faults_are_done_as_ordered(
         await until(lambda: not cloud.report("AGII").holds)
         await until(lambda: cloud.speed("AGII") > 0.5)
 
-        await port.post({"robot": "AGII", "kill": True})
-        before = cloud.report("AGII").origin.boot
-        await port.post({"robot": "AGII", "revive": True})
-        await until(lambda: cloud.report("AGII").origin.boot != before)
-        assert [h.source for h in cloud.report("AGII").holds] == ["boot"]
-
 
 async def test_a_deaf_robot_drives_on_whatever_its_gate_says_and_holds_still_bite(
     address: BrokerAddress, cloud: Cloud, tmp_path: Path

@@ -138,11 +138,7 @@ class EmulatedLink(MqttLink):
 
 
 class EmulatedRobot:
-    """One rig and its safety node, called in their slots.
-
-    Attributes:
-        started: Set when fault orders are accepted.
-    """
+    """One rig and its safety node, called in their slots."""
 
     def __init__(
         self,
@@ -151,23 +147,17 @@ class EmulatedRobot:
         settings: FleetSettings,
     ) -> None:
         self.robot_id = rig.robot_id
-        self.started = asyncio.Event()
         self._rig = rig
         self._world = world
-        self._settings = settings
-        self._node: RobotNode
-        self._node_task: asyncio.Task[None] | None = None
-        self._tasks: asyncio.TaskGroup
+        self._rate_hz = settings.rate_hz
         self._run_began = 0.0
         self._navigation_sent: tuple[str, float] = ("", -_NAVIGATION_EVERY_S)
         self._sensors = EmulatedSensors()
         self._requested = REST
-
-    def _new_node(self) -> RobotNode:
-        return RobotNode(
+        self._node = RobotNode(
             self.robot_id,
             replace(
-                self._settings.node,
+                settings.node,
                 read_clock=self._read_clock,
                 open_link=partial(EmulatedLink, is_mute=self._is_mute),
             ),
@@ -175,20 +165,17 @@ class EmulatedRobot:
             drive=self._obey_gate,
             navigate=partial(self._rig.pursue, around=self._world),
         )
+        if not settings.held:
+            self._node.release_locally()
 
     async def run(self, began: float, phase: float) -> None:
         """Drive and sense until cancelled; ``began`` is when the run began."""
         self._run_began = began
-        self._node = self._new_node()
-        if not self._settings.held:
-            self._node.release_locally()
-        async with asyncio.TaskGroup() as self._tasks:
-            self._start_node()
-            self.started.set()
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._node.run(), name=f"node-{self.robot_id}")
             await asyncio.sleep(phase)
-            await in_slots(
-                1.0 / self._settings.rate_hz, (self._drive, self._scan, self._look)
-            )
+            slots = self._drive, self._scan, self._look
+            await in_slots(1.0 / self._rate_hz, slots)
 
     # --- the slots ----------------------------------------------------------------
 
@@ -197,15 +184,12 @@ class EmulatedRobot:
 
     def _drive(self, dt: float) -> None:
         now, node = self._now(), self._node
-        if self._node_task is not None:
-            # While twists have no effect navigation requests zero: the gate requires
-            # that before it lets the robot move again.
-            requested = self._rig.requested_twist(now, self._world)
-            self._requested = requested if node.may_drive else REST
-            node.request_twist(self._requested)
+        # While twists have no effect navigation requests zero: the gate requires that
+        # before it lets the robot move again.
+        requested = self._rig.requested_twist(now, self._world)
+        self._requested = requested if node.may_drive else REST
+        node.request_twist(self._requested)
         self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
-        if self._node_task is None:
-            return
         node.sense(self._rig.odometry())
         navigation = self._rig.navigation()
         task, published_at = self._navigation_sent
@@ -216,12 +200,9 @@ class EmulatedRobot:
             node.sense(reading)
 
     def _scan(self, _: float) -> None:
-        if self._node_task is not None:
-            self._node.sense(self._rig.scan(self._world))
+        self._node.sense(self._rig.scan(self._world))
 
     def _look(self, _: float) -> None:
-        if self._node_task is None:
-            return
         self._node.sense(self._rig.detect(self._now(), self._world))
 
     def _obey_gate(self, command: Twist2D) -> None:
@@ -241,23 +222,11 @@ class EmulatedRobot:
 
     def obey(self, order: FaultOrder) -> None:
         """Execute a fault order in the order of its fields."""
-        node = self._node
         self._rig.obey(order)
         if order.local_hold is not None:
-            node.add_local_hold(order.local_hold)
+            self._node.add_local_hold(order.local_hold)
         if order.release_locally:
-            node.release_locally()
-        if order.kill and self._node_task is not None:
-            self._node_task.cancel()
-            self._node_task = None
-        if order.revive and self._node_task is None:
-            self._node = self._new_node()
-            self._start_node()
-
-    def _start_node(self) -> None:
-        self._node_task = self._tasks.create_task(
-            self._node.run(), name=f"node-{self.robot_id}"
-        )
+            self._node.release_locally()
 
 
 _log = logging.getLogger(__name__)
@@ -361,7 +330,7 @@ class SimulatedFleet:
             None, or the reason why it cannot be done.
         """
         robot = self._robots.get(order.robot)
-        if robot is None or not robot.started.is_set():
-            return f"there is no robot {order.robot}, or it has not started yet"
+        if robot is None:
+            return f"there is no robot {order.robot}"
         robot.obey(order)
         return None

@@ -9,7 +9,7 @@ route, and drives an open one forwards and backwards.  Left out: slip, load, slo
 
 import heapq
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -129,8 +129,8 @@ class Odometer:
 
 
 _CELL_M = 0.25
-_MARGINS_M = (0.4, 0.1)
-"""Tried one after the other beside half the robot's width (m)."""
+_MARGIN_M = 0.1
+"""Beside half the robot's width."""
 _SNAP_M = 0.75
 _Cell = tuple[int, int]
 _Place = tuple[float, float]
@@ -140,89 +140,62 @@ _STEPS = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0
 def way_between(
     start: _Place, goal: _Place, scenery: Scenery, half_width_m: float
 ) -> list[_Place] | None:
-    """Corners of a way for a robot of this width; None where there is none."""
-    for margin_m in _MARGINS_M:
-        grid = _Grid(scenery, half_width_m + margin_m)
-        way = grid.way(start, goal)
-        if way is not None:
-            return way
+    """Corners of the shortest way for a robot of this width; None: there is none."""
+    places = _free_cells(scenery, half_width_m + _MARGIN_M)
+    first, last = _cell_near(places, start), _cell_near(places, goal)
+    if first is None or last is None:
+        return None
+    cost, came_from = {last: 0.0}, {last: last}
+    queue = [(math.dist(first, last), last)]
+    while queue:
+        cell = heapq.heappop(queue)[1]
+        if cell == first:
+            return [
+                start,
+                *(places[passed] for passed in _chain(cell, came_from)),
+                goal,
+            ]
+        for i, j in _STEPS:
+            near, far = (cell[0] + i, cell[1] + j), cost[cell] + math.hypot(i, j)
+            if near in places and far < cost.get(near, math.inf):
+                cost[near], came_from[near] = far, cell
+                heapq.heappush(queue, (far + math.dist(near, first), near))
     return None
 
 
-class _Grid:
+def _chain(cell: _Cell, came_from: Mapping[_Cell, _Cell]) -> Iterator[_Cell]:
+    """Cells between this one and the one that a search began at."""
+    while came_from[cell] != came_from[came_from[cell]]:
+        cell = came_from[cell]
+        yield cell
+
+
+def _free_cells(scenery: Scenery, keep_off_m: float) -> dict[_Cell, _Place]:
     """Cells where the middle of a robot may be, with the place of each."""
+    bounds = scenery.bounds
+    xs = np.arange(bounds.xmin, bounds.xmax, _CELL_M) + _CELL_M / 2
+    ys = np.arange(bounds.ymin, bounds.ymax, _CELL_M) + _CELL_M / 2
+    x, y = np.meshgrid(xs, ys, indexing="ij")
+    away = np.minimum.reduce(
+        (x - bounds.xmin, bounds.xmax - x, y - bounds.ymin, bounds.ymax - y)
+    )
+    for xmin, ymin, xmax, ymax in scenery.rectangles:
+        dx = np.maximum(np.maximum(xmin - x, x - xmax), 0.0)
+        dy = np.maximum(np.maximum(ymin - y, y - ymax), 0.0)
+        away = np.minimum(away, np.hypot(dx, dy))
+    for px, py, radius in scenery.posts:
+        away = np.minimum(away, np.hypot(x - px, y - py) - radius)
+    return {
+        (int(i), int(j)): (float(x[i, j]), float(y[i, j]))
+        for i, j in np.argwhere(away > keep_off_m)
+    }
 
-    def __init__(self, scenery: Scenery, keep_off_m: float) -> None:
-        bounds = scenery.bounds
-        xs = np.arange(bounds.xmin, bounds.xmax, _CELL_M) + _CELL_M / 2
-        ys = np.arange(bounds.ymin, bounds.ymax, _CELL_M) + _CELL_M / 2
-        x, y = np.meshgrid(xs, ys, indexing="ij")
-        away = np.minimum.reduce(
-            (x - bounds.xmin, bounds.xmax - x, y - bounds.ymin, bounds.ymax - y)
-        )
-        for xmin, ymin, xmax, ymax in scenery.rectangles:
-            dx = np.maximum(np.maximum(xmin - x, x - xmax), 0.0)
-            dy = np.maximum(np.maximum(ymin - y, y - ymax), 0.0)
-            away = np.minimum(away, np.hypot(dx, dy))
-        for px, py, radius in scenery.posts:
-            away = np.minimum(away, np.hypot(x - px, y - py) - radius)
-        self._places: dict[_Cell, _Place] = {
-            (int(i), int(j)): (float(x[i, j]), float(y[i, j]))
-            for i, j in np.argwhere(away > keep_off_m)
-        }
 
-    def way(self, start: _Place, goal: _Place) -> list[_Place] | None:
-        """Corners from one place to another; None where nothing leads there."""
-        first, last = self._cell_near(start), self._cell_near(goal)
-        if first is None or last is None:
-            return None
-        cells = self._search(first, last)
-        if cells is None:
-            return None
-        corners = [start, *(self._places[cell] for cell in self._straight(cells)), goal]
-        return [a for a, b in zip(corners, [*corners[1:], None], strict=True) if a != b]
-
-    def _cell_near(self, place: _Place) -> _Cell | None:
-        """The free cell nearest to a place, within 0.75 m."""
-        away = {cell: math.dist(self._places[cell], place) for cell in self._places}
-        nearest = min(away, key=lambda cell: away[cell], default=None)
-        return nearest if nearest and away[nearest] <= _SNAP_M else None
-
-    def _search(self, first: _Cell, last: _Cell) -> list[_Cell] | None:
-        """The shortest way (A*); None where there is none."""
-        cost, came_from = {first: 0.0}, {first: first}
-        queue = [(math.dist(first, last), first)]
-        while queue:
-            cell = heapq.heappop(queue)[1]
-            if cell == last:
-                way = [cell]
-                while way[-1] != first:
-                    way.append(came_from[way[-1]])
-                return way[::-1]
-            for i, j in _STEPS:
-                near = cell[0] + i, cell[1] + j
-                far = cost[cell] + math.hypot(i, j)
-                if near in self._places and far < cost.get(near, math.inf):
-                    cost[near], came_from[near] = far, cell
-                    heapq.heappush(queue, (far + math.dist(near, last), near))
-        return None
-
-    def _straight(self, cells: list[_Cell]) -> list[_Cell]:
-        """The cells between first and last where the way has to turn."""
-        kept, at = [], 0
-        while at < len(cells) - 1:
-            farther = range(len(cells) - 1, at, -1)
-            at = next((n for n in farther if self._sees(cells[at], cells[n])), at + 1)
-            kept.append(cells[at])
-        return kept[:-1]
-
-    def _sees(self, one: _Cell, other: _Cell) -> bool:
-        (ax, ay), (bx, by) = one, other
-        steps = 2 * max(abs(bx - ax), abs(by - ay), 1)
-        along = np.linspace(0.0, 1.0, steps + 1)
-        x = np.rint(ax + (bx - ax) * along).astype(int).tolist()
-        y = np.rint(ay + (by - ay) * along).astype(int).tolist()
-        return all(cell in self._places for cell in zip(x, y, strict=True))
+def _cell_near(places: Mapping[_Cell, _Place], place: _Place) -> _Cell | None:
+    """The free cell nearest to a place, within 0.75 m."""
+    away = {cell: math.dist(centre, place) for cell, centre in places.items()}
+    nearest = min(away, key=lambda cell: away[cell], default=None)
+    return nearest if nearest and away[nearest] <= _SNAP_M else None
 
 
 _LOOK_AHEAD_M = 0.7
@@ -457,7 +430,7 @@ def _end_on(route: Route, goal: Goal) -> tuple[float, float]:
 
 def _route_along(corners: Sequence[tuple[float, float]]) -> Route:
     """A way as a route; one that ends where it begins has a point of each."""
-    if len(corners) == 1:
-        x, y = corners[0]
+    x, y = corners[0]
+    if corners[-1] == (x, y):
         corners = (x, y), (x + 0.01, y)
     return route_of(corners, 0.0, closed=False)

@@ -41,7 +41,6 @@ class FaultOrder(_Order):
         clock_offset_s: Its wall clock is this far ahead (s).
         local_hold: Its red button or bumper is pressed.
         release_locally: The crew lifts local holds and the boot hold.
-        kill: Its software ends; ``revive`` starts it again, held.
         thing: Something there is taken for a person where its camera has it in view, as
             surely and seldom as a person; null ends that.
         hide_people: Its camera detects no person.
@@ -53,8 +52,6 @@ class FaultOrder(_Order):
     clock_offset_s: Annotated[float, Field(ge=-1e9, le=1e9)] | None = None
     local_hold: Literal["hw", "bumper"] | None = None
     release_locally: bool = False
-    kill: bool = False
-    revive: bool = False
     thing: OrderPlace | None = None
     hide_people: bool | None = None
 

@@ -78,7 +78,7 @@ class Ros2Base:
         rate_hz: Of odometry, laser and camera each.
 
     Attributes:
-        started: Set when fault orders are accepted.
+        started: Set when it has told where its sensors sit.
     """
 
     def __init__(
