@@ -140,7 +140,6 @@ class MqttLink:
         self._mistake: Exception | None = None
         self.replaced = 0
         """Offered messages that a newer one overtook."""
-        self.connects = 0
 
     def attach(
         self,
@@ -223,7 +222,6 @@ class MqttLink:
         """Hand on and send, until a connection is lost."""
         self._client = client
         self._loss_told = False
-        self.connects += 1
         _log.info("%s: connected to the broker", self._name)
         self._on_connect()
         sender = asyncio.create_task(

@@ -59,7 +59,6 @@ class Provisioner:
         self._probe_seq = 0
         self._devices_at = self._unanswered_until = 0.0
         self._broken: set[str] = set()
-        self._warned: frozenset[str] = frozenset()
         self._gap = asyncio.Event()
         self._subscription_ids: frozenset[str] = frozenset()
         self._former_secrets: frozenset[str] = frozenset()
@@ -221,10 +220,6 @@ class Provisioner:
         _explain(done.mended)
         # What only a person can mend stands on the health page while it lasts.
         self._health_monitor.agent_warning = _in_short(done.problems)
-        for sentence in done.problems:
-            if sentence not in self._warned:
-                _log.warning("%s", sentence)
-        self._warned = frozenset(done.problems)
 
     async def _check_subscriptions(self) -> None:
         site, monitor = self._site, self._health_monitor
@@ -262,10 +257,10 @@ class Provisioner:
         """Log a loss once and a return once; says whether all is well."""
         if error is not None and what not in self._broken:
             self._broken.add(what)
-            _log.warning("%s: not as it should be: %s", what, error)
+            _log.warning("%s differs from the wanted state: %s", what, error)
         elif error is None and what in self._broken:
             self._broken.discard(what)
-            _log.info("%s: well again", what)
+            _log.info("%s repaired", what)
         return error is None
 
 

@@ -11,24 +11,14 @@ the history can end a STOP::
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterable
 from itertools import chain
-from typing import TypedDict, Unpack, cast
 
-from iveg.domain.alerts import SHOWN_S, BookedAlert
-from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.alerts import SHOWN_S
 from iveg.domain.events import Condition, Slot
-from iveg.domain.feedback import SpeedLimit
 from iveg.domain.observations import (
-    DetectionFrame,
-    EntityReading,
-    GoalAnswer,
     Instant,
-    Received,
-    SafetyReport,
 )
-from iveg.domain.rule.zones import LimitChange
-from iveg.domain.transports import TransportId
 
 _log = logging.getLogger(__name__)
 
@@ -38,36 +28,39 @@ LONGEST_TURN_S = 0.25
 """CPU that one turn of the loop may take; more delays STOP and feedback."""
 
 
-class Listeners(TypedDict, total=False):
-    """Events, and the facts that a listener is given."""
+EVENTS = (
+    "measured",
+    "notified",
+    "entity_read",
+    "arrived",
+    "frame_taken",
+    "obstacle_reported",
+    "goal_answered",
+    "aged",
+    "judged",
+    "decided",
+    "ticked",
+    "raised",
+    "changed",
+    "appended",
+)
+"""Events that vital code tells, with the facts that a listener is given.
 
-    measured: Callable[[str, bytes, Instant], object]
-    """A robot's own message was read: topic, payload, and when."""
-    notified: Callable[[bytes, Instant], object]
-    """A notification was read."""
-    entity_read: Callable[[EntityReading, Instant], object]
-    """Orion said something of other equipment."""
-    arrived: Callable[[Received], object]
-    """A copy of a message of the fleet came, by either transport."""
-    frame_taken: Callable[[DetectionFrame, Instant, Instant], object]
-    """A detection frame is judged: its source's moment, and when it came."""
-    obstacle_reported: Callable[[SafetyReport, Instant], object]
-    """A robot of today reported what its laser sees."""
-    goal_answered: Callable[[GoalAnswer, Instant, TransportId], object]
-    aged: Callable[[Instant], object]
-    """Time has passed for the world, which is not judged yet."""
-    judged: Callable[
-        [DetectionRule, Mapping[str, SpeedLimit], Sequence[LimitChange], Instant],
-        object,
-    ]
-    decided: Callable[[Iterable[Received], Instant], object]
-    """A judgement is over, and this is what it was made of."""
-    ticked: Callable[[Instant], object]
-    raised: Callable[[Sequence[BookedAlert]], object]
-    changed: Callable[[str], object]
-    """A live topic has changed."""
-    appended: Callable[[str, object], object]
-    """A live topic has a new item, which every browser is sent."""
+- ``measured(topic, payload, at)``: a robot's own message was read
+- ``notified(body, at)``: a notification was read
+- ``entity_read(EntityReading, at)``: Orion said something of other equipment
+- ``arrived(Received)``: a copy of a message of the fleet came, by either transport
+- ``frame_taken(DetectionFrame, sighted, at)``: a detection frame is judged
+- ``obstacle_reported(SafetyReport, at)``: a robot of today reported what its laser sees
+- ``goal_answered(GoalAnswer, at, TransportId)``
+- ``aged(now)``: time has passed for the world, which is not judged yet
+- ``judged(DetectionRule, limits, changes, now)``
+- ``decided(received, now)``: a judgement is over, and this is what it was made of
+- ``ticked(now)``
+- ``raised(alerts)``
+- ``changed(topic)``: a live topic has changed
+- ``appended(topic, item)``: a live topic has a new item, which every browser is sent
+"""
 
 
 class Supervision:
@@ -87,7 +80,7 @@ class Supervision:
         self.counters: Counter[str] = Counter()
         self._clock = clock
         self._listeners: dict[str, list[tuple[str, Callable[..., object]]]] = {
-            event: [] for event in Listeners.__annotations__
+            event: [] for event in EVENTS
         }
         self._first_pause_s = first_pause_s
         self._failed_at: dict[str, float] = {}
@@ -97,9 +90,13 @@ class Supervision:
         """When the newest long turn ended (monotonic, s), and its CPU (s)."""
         self._found: dict[str, tuple[Condition, ...]] = {}
 
-    def listen(self, part: str, **calls: Unpack[Listeners]) -> None:
-        """Have a part of comfort told of these events, after all who listen already."""
-        for event, call in cast("Mapping[str, Callable[..., object]]", calls).items():
+    def listen(self, part: str, **calls: Callable[..., object]) -> None:
+        """Have a part of comfort told of these events, after all who listen already.
+
+        Raises:
+            KeyError: there is no such event.
+        """
+        for event, call in calls.items():
             self._listeners[event].append((part, call))
 
     def tell(self, event: str, *facts: object) -> None:

@@ -195,10 +195,8 @@ def _read_ranges(points: object) -> NDArray[np.float32]:
     Raises:
         ValidationError: not a list of at most 4,096 numbers and nulls in range.
     """
-    buffer = _compact(points)
-    if isinstance(buffer, np.ndarray):
-        return buffer
-    return ranges_of(_POINTS.validate_python(points))
+    compact = _compact(points)
+    return ranges_of(_POINTS.validate_python(points)) if compact is None else compact
 
 
 def ranges_of(points: list[float | None]) -> NDArray[np.float32]:
@@ -208,23 +206,23 @@ def ranges_of(points: list[float | None]) -> NDArray[np.float32]:
     return ranges
 
 
-def _compact(points: object) -> object:
-    """Numbers as one buffer where nothing has to be judged; else what was given.
+def _compact(points: object) -> NDArray[np.float32] | None:
+    """Numbers as one buffer where nothing has to be judged; None elsewhere.
 
     That is: no null, no bool, all in range.  Hundreds of Python's numbers would have
     left the processor's cache when the scan is drawn.
     """
     if type(points) is not list or not 0 < len(points) <= MAX_BEAMS:
-        return points
+        return None
     try:
         numbers = np.frombuffer(array("d", points))
     except (TypeError, OverflowError):
-        return points
+        return None
     # A bool looks like 0 or 1 here.  "Not" also refuses NaN, which no JSON has.
     if not (numbers.min() >= 0.0 and numbers.max() <= MAX_RANGE_M):
-        return points
+        return None
     if np.any(numbers == 0.0) or np.any(numbers == 1.0):
-        return points
+        return None
     return numbers.astype(np.float32)
 
 
