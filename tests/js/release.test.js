@@ -80,6 +80,9 @@ test("a release says how it ended, and never more than the robot did", () => {
   equal(said({ state: "RELEASING" }), "release.sent");
   equal(said({ state: "READY" }), "release.confirmed");
   equal(said({ state: "STANDING", reason: "challenge" }), "release.refused");
-  equal(said({ state: "EXPIRED", reason: "release_unconfirmed" }), "release.unconfirmed");
+  equal(
+    said({ state: "EXPIRED", reason: "release_unconfirmed" }),
+    "release.unconfirmed",
+  );
   equal(said({ state: "REPLACED", reason: "requested" }), "release.replaced");
 });
