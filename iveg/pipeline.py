@@ -132,7 +132,7 @@ def build(
         PeerScans(world, scans, ports.fleet.publish_peer_scan, choices.boot),
         Mapper(world, greenhouse.bounds, scans),
         CoverageMonitor(world, greenhouse),
-        Trials(core, evaluator, rules, kept.trial),
+        Trials(core, evaluator, rules),
     )
 
 

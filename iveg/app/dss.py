@@ -43,7 +43,6 @@ from iveg.comfort.messenger import PART as MESSAGES
 from iveg.comfort.messenger import Messenger
 from iveg.comfort.retention import PART as RETENTION
 from iveg.comfort.retention import HistoryUpkeep
-from iveg.comfort.trials import PART as TRIAL
 from iveg.domain.alerts import MOST_KEPT, read_alert
 from iveg.domain.errors import HopError, SettingsError, VitalPartError
 from iveg.domain.fleet import FleetDescription
@@ -341,7 +340,6 @@ class Dss:
             RETENTION: partial(self.upkeep.run, clock.now),
             RECORDINGS: self.stores.inputs.run,
             "pictures": self._take_pictures,
-            TRIAL: parts.trials.run,
             MESSAGES: self.messenger.run,
             ACCOUNTS: self.accounts.run,
             "earlier": self._remember,

@@ -23,7 +23,7 @@ from iveg.adapters.mqtt import BrokerAddress, MqttLink, TlsFiles
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.adapters.recordings.writer import WriterSetup
-from iveg.adapters.rules import FileRules, FileTrials
+from iveg.adapters.rules import FileRules
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import OutOfService
 from iveg.domain.fleet import FleetDescription
@@ -53,7 +53,6 @@ class Stores:
     rules: FileRules
     detectors: FileByRobot[OutOfService]
     words: FileByRobot[WordAnswer]
-    trials: FileTrials
     access: AccessFile
     inputs: InputRecorder
 
@@ -78,7 +77,6 @@ class Stores:
             self.rules.append,
             Kept(self.detectors.load(), self.detectors.save),
             Kept(self.words.load(), self.words.save),
-            Kept(self.trials.load(), self.trials.save),
         )
 
     async def close(self) -> None:
@@ -157,7 +155,6 @@ def open_stores(
         FileRules(directory / "rules.jsonl"),
         FileByRobot(directory / "detectors.jsonl", "detectors", _OUT),
         FileByRobot(directory / "words.jsonl", "words", _WORD),
-        FileTrials(directory / "trial.jsonl"),
         AccessFile(directory / ACCOUNTS),
         InputRecorder(
             WriterSetup(
