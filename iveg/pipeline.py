@@ -92,7 +92,7 @@ class Pipeline:
         )
         supervision.listen("margins", ticked=NewestMargins(core).tick)
         supervision.listen(EQUIPMENT, entity_read=self.equipment.receive)
-        self.trials = Trials(core, self.evaluator, self.rules, kept.trial)
+        self.trials = Trials(core, self.evaluator, self.rules)
 
     def counters(self) -> Counter[str]:
         """Everything that is counted in it."""

@@ -1,10 +1,9 @@
-"""The rule's versions and its trial, each in a small file of JSON lines.
+"""The rule's versions, in a small file of JSON lines.
 
 The settings make the first version.  A person's change outlives a restart, until the
 settings themselves change: then these are newer, and a version of their own.  A file
 with a line that cannot be read is put aside, and the strictest rule of what is left of
-it is in force until a person makes another.  A trial that cannot be read is put aside:
-then nothing is tried, and nothing else changes.
+it is in force until a person makes another.
 """
 
 import asyncio
@@ -18,10 +17,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from iveg.adapters.files import (
     Form,
-    load_lines,
     put_aside,
     read_lines,
-    save_lines,
     write_lines,
 )
 from iveg.domain.comparison import Comparison
@@ -33,7 +30,6 @@ from iveg.domain.detection_rule import (
 from iveg.domain.errors import HopError
 from iveg.domain.observations import Instant
 from iveg.domain.parameters import PARAMETERS, Class, by_names
-from iveg.domain.rule.trial import Difference, Trial
 from iveg.domain.stamps import format_stamp
 from iveg.models.rule import parameter_fields
 
@@ -191,47 +187,3 @@ def rule_fields(rule: DetectionRule) -> dict[str, object]:
     """The line of a version."""
     own = {name: getattr(rule, name) for name in _StoredRule.model_fields}
     return {**by_names(rule), **own, "aliases": dict(rule.aliases)}
-
-
-TRIALS_FORM = Form("trial")
-
-
-class FileTrials:
-    """The trial in one file."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def load(self) -> Trial | None:
-        """The stored one."""
-        return next(iter(load_lines(self._path, TRIALS_FORM, _read)), None)
-
-    async def save(self, trial: Trial | None) -> None:
-        """Replace the stored one; returns when that is on disk.
-
-        Raises:
-            HopError: the disk did not take it.
-        """
-        lines: list[dict[str, object]] = []
-        if trial is not None:
-            names = _StoredTrial.model_fields
-            fields = {name: getattr(trial, name) for name in names}
-            lines = [{**fields, "rule": rule_fields(trial.rule)}]
-        await save_lines(self._path, TRIALS_FORM, lines)
-
-
-class _StoredTrial(BaseModel):
-    """The line of the file."""
-
-    model_config = ConfigDict(strict=True, extra="forbid")
-
-    rule: StoredRule
-    by: str
-    since: float
-    so_far: Comparison | None
-    differences: tuple[Difference, ...]
-
-
-def _read(line: bytes) -> Trial:
-    stored = _StoredTrial.model_validate_json(line)
-    return Trial(**{**dict(stored), "rule": stored.rule.rule()})

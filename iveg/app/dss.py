@@ -42,7 +42,6 @@ from iveg.comfort.equipment import TICK_S as EQUIPMENT_TICK_S
 from iveg.comfort.maps import COVERAGE_TICK_S, SCAN_TICK_S
 from iveg.comfort.messenger import PART as MESSAGES
 from iveg.comfort.messenger import Messenger
-from iveg.comfort.trials import PART as TRIAL
 from iveg.domain.alerts import MOST_KEPT, read_alert
 from iveg.domain.errors import HopError, SettingsError, VitalPartError
 from iveg.domain.fleet import FleetDescription
@@ -329,7 +328,6 @@ class Dss:
             RETENTION: partial(self.upkeep.run, clock.now),
             RECORDINGS: self.stores.inputs.run,
             "pictures": self._take_pictures,
-            TRIAL: parts.trials.run,
             MESSAGES: self.messenger.run,
             ACCOUNTS: self.accounts.run,
             "earlier": self._remember,

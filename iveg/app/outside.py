@@ -24,7 +24,7 @@ from iveg.adapters.mqtt import BrokerAddress, MqttLink, TlsFiles
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.reconciler import FiwareSite
 from iveg.adapters.recordings.recorder import InputRecorder
-from iveg.adapters.rules import FileRules, FileTrials
+from iveg.adapters.rules import FileRules
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import OutOfService
 from iveg.domain.words import WordAnswer
@@ -53,7 +53,6 @@ class Stores:
     rules: FileRules
     detectors: FileByRobot[OutOfService]
     words: FileByRobot[WordAnswer]
-    trials: FileTrials
     access: AccessFile
     inputs: InputRecorder
 
@@ -69,7 +68,6 @@ class Stores:
             self.rules.append,
             Kept(self.detectors.load(), self.detectors.save),
             Kept(self.words.load(), self.words.save),
-            Kept(self.trials.load(), self.trials.save),
         )
 
     async def close(self) -> None:
@@ -144,7 +142,6 @@ def open_stores(settings: Settings, data_directory: Path) -> Stores:
         FileRules(directory / "rules.jsonl"),
         FileByRobot(directory / "detectors.jsonl", "detectors", _OUT),
         FileByRobot(directory / "words.jsonl", "words", _WORD),
-        FileTrials(directory / "trial.jsonl"),
         AccessFile(directory / ACCOUNTS),
         InputRecorder(
             directory / "recordings", clock.now, settings.limits_of_recordings

@@ -63,7 +63,6 @@ class VirtualPipeline:
             self.keep,
             Kept({}, self.keep),
             Kept({}, self.keep),
-            Kept(None, self.keep),
         )
         self.parts = Pipeline(fleet, greenhouse, ports, Choices(kept))
 

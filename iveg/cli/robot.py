@@ -26,7 +26,6 @@ from iveg.domain.fleet import (
     is_robot_id,
 )
 from iveg.domain.witness import Plan
-from iveg.ngsi import names
 from iveg.robot.ros2.checking import CheckRow, judge, lines
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs, Subscriptions

@@ -2,10 +2,9 @@
 
 It takes the same frames, reports and ticks at the same moments, and has people, zones
 and entries of its own.  No feedback, decision or alert knows of it
-(``tests/properties/test_shadow``).
+(``tests/properties/test_shadow``).  iVeg's end ends it.
 """
 
-import asyncio
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -20,10 +19,9 @@ from iveg.domain.rule.zones import LimitChange
 from iveg.domain.tracking.sight import Look, OwnSight
 from iveg.vital.core import Core
 from iveg.vital.evaluate import Evaluator
-from iveg.vital.operators import Kept, Rules
+from iveg.vital.operators import Rules
 
 PART: Final = "shadow-rule"
-SAVED_EVERY_S: Final = 30.0
 _SETTLES_S: Final = 2.0
 """Until then it may still miss what those in force remember of earlier scans."""
 
@@ -94,18 +92,10 @@ class Trials:
     Args:
         core: Its supervision tells a trial what happens, at the same moments as those
             in force.
-        kept: What the last run left, and where the trial is kept for the next one.
     """
 
-    def __init__(
-        self,
-        core: Core,
-        evaluator: Evaluator,
-        rules: Rules,
-        kept: Kept[Trial | None],
-    ) -> None:
-        self._evaluator, self._rules, self._save = evaluator, rules, kept.save
-        self._one_by_one = asyncio.Lock()
+    def __init__(self, core: Core, evaluator: Evaluator, rules: Rules) -> None:
+        self._evaluator, self._rules = evaluator, rules
         self._running: ShadowRun | None = None
         core.supervision.listen(
             PART,
@@ -114,8 +104,6 @@ class Trials:
             aged=partial(self._follow, ShadowRun.aged),
             judged=partial(self._follow, ShadowRun.judged),
         )
-        if kept.value is not None:
-            self.start(kept.value, core.ports.clock())
 
     @property
     def current(self) -> Trial | None:
@@ -126,10 +114,6 @@ class Trials:
         """Run a trial from now on."""
         self._running = ShadowRun(trial, self._evaluator, now)
 
-    def stop(self) -> None:
-        """Forget the trial."""
-        self._running = None
-
     def _follow(self, take: Callable[..., None], *facts: object) -> None:
         """Have the trial take what those in force did; what fails ends it."""
         if self._running is None:
@@ -138,38 +122,32 @@ class Trials:
             take(self._running, *facts)
         except Exception:
             # What it says from here on would be wrong.
-            self.stop()
+            self._running = None
             raise
 
-    async def begin(self, wanted: DetectionRule, by: str, at: Instant) -> Trial:
+    def begin(self, wanted: DetectionRule, by: str, at: Instant) -> Trial:
         """Try a candidate.
 
         Raises:
             TrialRefusedError: another is tried, or it is the version in force.
-            HopError: it could not be written down; nothing is tried.
         """
-        async with self._one_by_one:
-            if self.current is not None:
-                raise TrialRefusedError("running")
-            if is_same(wanted, self._rules.current):
-                raise TrialRefusedError("same")
-            trial = Trial(replace(wanted, author=by, since=None), by, at.wall)
-            await self._save(trial)
-            self.start(trial, at)
-            return trial
+        if self._running is not None:
+            raise TrialRefusedError("running")
+        if is_same(wanted, self._rules.current):
+            raise TrialRefusedError("same")
+        trial = Trial(replace(wanted, author=by, since=None), by, at.wall)
+        self.start(trial, at)
+        return trial
 
-    async def end(self) -> Trial:
+    def end(self) -> Trial:
         """End the trial; returns it as it stood.
 
         Raises:
             TrialRefusedError: nothing is tried.
-            HopError: it could not be written down; the trial goes on.
         """
-        async with self._one_by_one:
-            trial = self._tried()
-            await self._save(None)
-            self.stop()
-            return trial
+        trial = self._tried()
+        self._running = None
+        return trial
 
     async def promote(self, by: str, at: Instant, seen: int) -> DetectionRule:
         """Put the candidate in force, with what came of the trial; that ends.
@@ -179,31 +157,18 @@ class Trials:
             OutdatedError: another version is in force than was seen.
             HopError: it could not be written down; the old version stays in force.
         """
-        async with self._one_by_one:
-            trial = self._tried()
-            wanted = replace(trial.rule, comparison=trial.so_far)
-            rule = await self._rules.change(wanted, by, at, seen)
-            self.stop()
-            await self._save(None)
-            return rule
+        trial, running = self._tried(), self._running
+        wanted = replace(trial.rule, comparison=trial.so_far)
+        rule = await self._rules.change(wanted, by, at, seen)
+        if self._running is running:
+            self._running = None
+        return rule
 
     def _tried(self) -> Trial:
         trial = self.current
         if trial is None:
             raise TrialRefusedError("none")
         return trial
-
-    async def run(self) -> None:
-        """Write down what came of a trial now and then, until cancelled."""
-        while True:
-            await asyncio.sleep(SAVED_EVERY_S)
-            await self.save()
-
-    async def save(self) -> None:
-        """Write down what came of the trial so far.  Raises HopError."""
-        async with self._one_by_one:
-            if (trial := self.current) is not None:
-                await self._save(trial)
 
 
 def is_same(one: DetectionRule, other: DetectionRule) -> bool:

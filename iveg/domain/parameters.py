@@ -183,17 +183,18 @@ Sent = Mapping[str, Mapping[Class, float]]
 
 def by_keys(parameters: Parameters) -> dict[str, object]:
     """All values, as REST has them."""
-    flat = dict[str, object]()
-    for row in PARAMETERS:
-        flat |= row.written(getattr(parameters, row.name), row.key)
-    return flat
+    return _written(parameters, "key")
 
 
 def by_names(parameters: Parameters) -> dict[str, object]:
     """All values, as stored lines have them."""
+    return _written(parameters, "name")
+
+
+def _written(parameters: Parameters, key: Literal["key", "name"]) -> dict[str, object]:
     flat = dict[str, object]()
     for row in PARAMETERS:
-        flat |= row.written(getattr(parameters, row.name), row.name)
+        flat |= row.written(getattr(parameters, row.name), getattr(row, key))
     return flat
 
 

@@ -13,7 +13,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.records import SHOWN_COLUMNS, CommandEventRecord, CommandRecord
 from iveg.domain.stop import StopMachine
 from iveg.domain.stop.commands import Outcome, outcome_of, was_loud, write_command
-from iveg.domain.transports import DIRECT, TransportId
+from iveg.domain.transports import TransportId
 from iveg.models.base import (
     OR_NONE,
     Hundredth,
@@ -21,13 +21,9 @@ from iveg.models.base import (
     Row,
     Slots,
     Stamp,
-    Tenth,
     Thousandth,
     row_of,
 )
-
-AGENT_LATE_S = 1.0
-"""An agent that is less behind than this is not worth a sentence."""
 
 
 class CommandTimes(Model):
@@ -140,13 +136,9 @@ class Command(Row):
         requesters: All who pressed.
         hold_id: What a STOP is called at the robot: its own ``command_id`` unless it
             keeps an earlier hold; null for others.
-        pressed_doubted: The page told a time that cannot be.
         age_s: Since it was requested (s).
         transports: By transport: ``ok``, ``failed``, ``off``, ``pending`` or
             ``unknown``, see above.
-        agent_lag_s: How late the IoT Agent was when it was last sent; null if unknown
-            (s).
-        note: The sentence of that; null where the agent keeps up or nobody knows.
         robot: The robot's last word while it is open.
         challenge_fresh: A release may be composed now.
         was_loud: It was UNCONFIRMED or STILL_MOVING at any time.
@@ -158,11 +150,8 @@ class Command(Row):
     )
     requesters: list[str]
     hold_id: str | None = None
-    pressed_doubted: bool = False
     age_s: Thousandth | None = None
     transports: dict[str, str]
-    agent_lag_s: Tenth | None = None
-    note: Sentence | None = None
     robot: CommandRobot | None = None
     challenge_fresh: bool = False
     outcome: Outcome | None = Field(
@@ -191,11 +180,8 @@ class Command(Row):
             write_command(followed),
             requesters=list(followed.requesters),
             hold_id=followed.hold_id,
-            pressed_doubted=followed.times.pressed_doubted,
             age_s=now.mono - followed.times.requested.mono,
             transports=dict(followed.transports),
-            agent_lag_s=followed.agent_lag_s,
-            note=_note(followed),
             robot=_robot(machine, now),
             challenge_fresh=machine.evidence.report_age(now) <= LIMITS.report_fresh_s,
             steps=[],
@@ -236,16 +222,6 @@ def _robot(machine: StopMachine, now: Instant) -> CommandRobot:
         report_age_s=age if isfinite(age) else None,
         moved_m=machine.evidence.moved_m(now),
     )
-
-
-def _note(followed: stop.FollowedCommand) -> Sentence | None:
-    """Note about a late agent for an order that went through it."""
-    lag = followed.agent_lag_s
-    if lag is None or lag <= AGENT_LATE_S:
-        return None
-    direct = followed.transports[DIRECT.id] not in ("off", "failed")
-    key = "stop.note.direct" if direct else "stop.note.fiware"
-    return Sentence(key=key, slots={"lag": round(lag, 1)})
 
 
 class Pressed(Model):

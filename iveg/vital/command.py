@@ -36,7 +36,8 @@ from iveg.domain.stop import (
     SetDesiredState,
     StopMachine,
 )
-from iveg.domain.stop import machine as stop_conditions
+from iveg.domain.stop.commands import PLAIN
+from iveg.domain.stop.machine import of_machines
 from iveg.domain.transports import FIWARE, TransportId
 from iveg.vital import topics
 from iveg.vital.core import Core
@@ -45,7 +46,6 @@ _log = logging.getLogger(__name__)
 CameBack = Callable[[StopMachine, list[Effect], Instant], None]
 _Send = Callable[[], Coroutine[None, None, None]]
 _KEPT = 200
-_PLAIN = Press()
 REMEMBERED_S = 60.0
 """Time that a press is known by its id (s)."""
 _MOST_PRESSES = 4096
@@ -242,11 +242,8 @@ class Commander:
         }
         self.commands: dict[str, FollowedCommand] = {}
         self.counters: Counter[str] = Counter()
-        self._mistakes: dict[str, OffTable] = {}
-        """Robots whose machine once had no step: shown until iVeg starts again."""
         self._presses = Presses()
         self._sender = OrderSender(core, self._came_back)
-        self._agent_lag_s = core.health_monitor.probe.lag
         self._journal, self._event_log = core.ports.journal, core.event_log
         self._new_id = core.ports.new_id
 
@@ -264,7 +261,7 @@ class Commander:
     # --- people -------------------------------------------------------------------
 
     async def stop(
-        self, robots: Iterable[str], by: str, at: Instant, press: Press = _PLAIN
+        self, robots: Iterable[str], by: str, at: Instant, press: Press = PLAIN
     ) -> list[FollowedCommand]:
         """STOP these robots, in parallel; returns when it is sent and on disk."""
         machines = [self.machine(robot_id) for robot_id in robots]
@@ -407,8 +404,7 @@ class Commander:
 
     def conditions(self, now: Instant) -> Iterable[Condition]:
         """Alert conditions of STOP."""
-        yield from stop_conditions.of_machines(self.machines.values(), now)
-        yield from stop_conditions.of_mistakes(self._mistakes.values())
+        return of_machines(self.machines.values(), now)
 
     # --- effects ------------------------------------------------------------------
 
@@ -418,12 +414,10 @@ class Commander:
         for effect in effects:
             match effect:
                 case SendStop():
-                    machine.note_lag(self._agent_lag_s(at))
                     self._sender.send_stop(machine, effect)
                     # A silent robot says nothing that would carry the new count.
                     self._show(machine)
                 case SendOnce():
-                    machine.note_lag(self._agent_lag_s(at))
                     self._sender.send_once(machine, effect)
                 case SetDesiredState():
                     self._sender.set_desired_state(effect)
@@ -442,11 +436,10 @@ class Commander:
                 self.commands[command.command_id] = command
 
     def _note_mistake(self, effect: OffTable) -> None:
-        """A mistake of the program in STOP: logged once, counted each time, shown."""
+        """A mistake of the program in STOP: logged once, counted each time."""
         self.counters["stop.off_table"] += 1
-        if self._mistakes.get(effect.robot_id) != effect:
+        if self.counters["stop.off_table"] == 1:
             _log.error("STOP: no step for %s", effect)
-        self._mistakes[effect.robot_id] = effect
 
     def _came_back(
         self, machine: StopMachine, effects: list[Effect], at: Instant
@@ -459,16 +452,14 @@ class Commander:
         self._event_log.changed(topics.ROBOT.of(machine.robot_id))
 
     def _record(self, machine: StopMachine, changed: Changed, at: Instant) -> None:
-        # What is open may know more than this step did: how late the agent is.
-        known = (*changed.commands, *machine.commands)
-        self.commands |= {one.command_id: one for one in known}
+        self.commands |= {one.command_id: one for one in changed.commands}
         while len(self.commands) > _KEPT:
             del self.commands[next(iter(self.commands))]
         command = self.commands.get(changed.command_id)
-        if command is not None:
-            self._event_log.command(command, changed, at)
-            if changed.key in ("ready", "running"):
-                self._note_end(command, at)
+        # A release that is confirmed moves the row of its STOP on, too.
+        for followed in changed.commands:
+            step = changed if followed is command else None
+            self._event_log.command(followed, step, at)
         desired = _JOURNALLED.get(changed.key)
         if desired is not None:
             by = "iveg" if command is None else command.requesters[0]
@@ -480,14 +471,6 @@ class Commander:
             )
         self._log_line(machine, command, changed, at)
         self._show(machine)
-
-    def _note_end(self, command: FollowedCommand, at: Instant) -> None:
-        """A release or resume that was confirmed also moves the STOP on."""
-        for earlier in reversed(self.commands.values()):
-            if earlier.robot_id == command.robot_id and earlier.kind == "stop":
-                if earlier is not command:
-                    self._event_log.command(earlier, None, at)
-                return
 
     def _log_line(
         self,

@@ -19,7 +19,6 @@ from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import Instant
 from iveg.domain.parameters import CLASSES, PARAMETERS, for_class
 from iveg.domain.robot_state import RobotState
-from iveg.domain.rule.trial import Trial
 from iveg.domain.tracking.person import LONGEST_S, MOST_THINGS, Thing
 from iveg.domain.words import WordAnswer
 from iveg.vital import topics
@@ -53,14 +52,12 @@ class KeptChoices:
         append_rule: Writes one more, as ``Kept.save`` does.
         out_of_service: Detectors that nobody waits for, by robot.
         words: What operators said of words of detectors.
-        trial: Of a candidate of the rule.
     """
 
     rules: Sequence[DetectionRule]
     append_rule: Callable[[DetectionRule], Awaitable[None]]
     out_of_service: Kept[Mapping[str, OutOfService]]
     words: Kept[Mapping[str, WordAnswer]]
-    trial: Kept[Trial | None]
 
 
 class Rules:

@@ -6,7 +6,6 @@ from typing import Generic, TypeVar
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import OutOfService
 from iveg.domain.errors import HopError
-from iveg.domain.rule.trial import Trial
 from iveg.domain.words import WordAnswer
 from iveg.vital.operators import Kept, KeptChoices
 
@@ -50,7 +49,6 @@ class FakeChoices:
         self.rules = FakeRuleStore()
         self.out_of_service = FakeStore[Mapping[str, OutOfService]]({})
         self.words = FakeStore[Mapping[str, WordAnswer]]({})
-        self.trial = FakeStore[Trial | None](None)
 
     @property
     def kept(self) -> KeptChoices:
@@ -60,5 +58,4 @@ class FakeChoices:
             self.rules.append,
             self.out_of_service.kept,
             self.words.kept,
-            self.trial.kept,
         )

@@ -58,5 +58,5 @@ def _happen(desk: Desk, candidate: DetectionRule, happens: str) -> None:
     trials, now = desk.parts.trials, desk.clock()
     if happens == "begin":
         trials.start(Trial(candidate, "ana", now.wall), now)
-    elif happens == "end":
-        trials.stop()
+    elif happens == "end" and trials.current is not None:
+        trials.end()

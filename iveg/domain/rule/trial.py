@@ -47,7 +47,7 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A trial as it is written down.
+    """A trial as it stands.
 
     Attributes:
         rule: The candidate.
@@ -64,23 +64,12 @@ class Trial:
 
 
 class Account:
-    """Compares, judgement by judgement.
-
-    Args:
-        trial: As it was written down last.
-    """
+    """Compares, judgement by judgement."""
 
     def __init__(self, trial: Trial) -> None:
-        self._trial, self._so_far = trial, trial.so_far
-        until = trial.since if trial.so_far is None else trial.so_far.until
-        # What went on when iVeg ended, ended with it.
-        self._ended = deque(
-            (
-                one if one.ended is not None else replace(one, ended=until)
-                for one in trial.differences
-            ),
-            MOST_KEPT,
-        )
+        self._trial = trial
+        self._so_far: Comparison | None = None
+        self._ended: deque[Difference] = deque(maxlen=MOST_KEPT)
         self._open: dict[str, Difference] = {}
         self._at: float | None = None
 

@@ -68,24 +68,15 @@ class Times:
 
     Attributes:
         pressed: Unix time (s); None where the page sent none, or an impossible one.
-        pressed_doubted: The page sent an impossible time.
         sent: By transport, when it first took it.
         answered: By transport, when the robot first said that it has it.
     """
 
     requested: Instant
     pressed: float | None = None
-    pressed_doubted: bool = False
     sent: Mapping[TransportId, Instant] = field(default_factory=dict)
     answered: Mapping[TransportId, Instant] = field(default_factory=dict)
     standing: Instant | None = None
-
-    @classmethod
-    def from_press(cls, at: Instant, press: Press) -> "Times":
-        """A command accepted now; its press as the page sent it, if plausible."""
-        pressed = believe(press.pressed_at, at)
-        doubted = pressed is None and press.pressed_at is not None
-        return cls(at, pressed, doubted)
 
     def ms_from_press(self, at: Instant) -> float:
         """From the press, or the acceptance where it is unknown, to a moment (ms)."""
@@ -105,8 +96,6 @@ class FollowedCommand:
         transports: Each ``pending``, ``ok``, ``failed``, ``unknown`` or ``off``
             (docs/interfaces/resources.md).
         held_as: The hold of an earlier STOP that this one holds on to.
-        agent_lag_s: How far the IoT Agent was behind when it was sent (s); None where
-            nobody knows.
     """
 
     command_id: str
@@ -120,7 +109,6 @@ class FollowedCommand:
     standstill_ms: float | None = None
     transports: Mapping[TransportId, str] = field(default_factory=dict)
     held_as: str | None = None
-    agent_lag_s: float | None = None
 
     @property
     def hold_id(self) -> str | None:

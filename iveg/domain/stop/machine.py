@@ -143,12 +143,6 @@ class StopMachine(StopStatus):
             return []
         return self._step(Event("sent", at))
 
-    def note_lag(self, lag_s: float | None) -> None:
-        """Note the lag of the IoT Agent while an order is being sent (s)."""
-        newest = self.once or self.stop
-        if newest is not None:
-            self._keep(replace(newest, agent_lag_s=lag_s))
-
     # --- the robot ----------------------------------------------------------------
 
     def answered(
@@ -434,11 +428,3 @@ def of_machines(machines: Iterable[StopMachine], now: Instant) -> Iterable[Condi
             yield Condition.of_robot("P1", key, robot_id, age=age)
         if stop.reason == "moved" and machine.state in _NOT_AT_REST:
             yield Condition.of_robot("P1", "alert.stop_moved", robot_id, age=age)
-
-
-def of_mistakes(mistakes: Iterable[OffTable]) -> Iterable[Condition]:
-    """Conditions of internal errors of the machine."""
-    for one in mistakes:
-        yield Condition.of_robot(
-            "P2", "alert.stop_off_table", one.robot_id, state=one.state, event=one.key
-        )

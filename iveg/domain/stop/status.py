@@ -19,7 +19,15 @@ from typing import Literal
 
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import CommandAnswer, Instant, SafetyReport
-from iveg.domain.stop.commands import PLAIN, FollowedCommand, Kind, Press, State, Times
+from iveg.domain.stop.commands import (
+    PLAIN,
+    FollowedCommand,
+    Kind,
+    Press,
+    State,
+    Times,
+    believe,
+)
 from iveg.domain.stop.standstill import StopEvidence
 from iveg.domain.transports import Transport, TransportId
 
@@ -205,7 +213,7 @@ class Event:
             robot_id,
             kind,
             "REQUESTED" if is_stop else "RELEASING",
-            Times.from_press(self.at, self.press),
+            Times(self.at, believe(self.press.pressed_at, self.at)),
             requesters=(self.by,),
             tries=0 if is_stop else 1,
             reason=None if plain else self.key,

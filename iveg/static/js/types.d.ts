@@ -108,11 +108,8 @@ export type Command = {
   standstill_ms: number | null;
   requesters: string[];
   hold_id: string | null;
-  pressed_doubted: boolean;
   age_s: number | null;
   transports: Record<string, string>;
-  agent_lag_s: number | null;
-  note: Sentence | null;
   robot: CommandRobot | null;
   challenge_fresh: boolean;
   /** How it ended; null on ``/live``, where ``state`` says how it stands. */

@@ -32,8 +32,6 @@ class _RuleChange(Body):
     version: int | None = None
     """The version that the person saw: 428 without, 409 when it is in force no more."""
     aliases: Annotated[dict[str, Class], Field(max_length=_MOST_ALIASES)] | None = None
-    possible_people: bool | None = None
-    """Kept from one version ago: looks always add up."""
 
     @field_validator("aliases")
     @classmethod
@@ -45,13 +43,6 @@ class _RuleChange(Body):
         if "" in cleaned or any(cleaned.get(n, c) != c for n, c in own.items()):
             raise ValueError("names must not be empty; person and robot are themselves")
         return {**cleaned, **own}
-
-    @field_validator("possible_people")
-    @classmethod
-    def _always(cls, possible_people: bool | None) -> bool | None:
-        if possible_people is False:
-            raise ValueError("looks always add up; leave this key out")
-        return possible_people
 
     def applied_to(self, rule: DetectionRule) -> DetectionRule:
         """A rule with these parameters, of nobody yet."""
@@ -132,12 +123,12 @@ def router(rules: Rules, trials: Trials, clock: Clock) -> APIRouter:
     async def begin(body: RuleChange, who: Operator) -> Response:
         """Try the rule in force with other parameters, beside it."""
         wanted = body.applied_to(rules.current)
-        return Json(TrialModel.of(await trials.begin(wanted, who.name, clock())), 201)
+        return Json(TrialModel.of(trials.begin(wanted, who.name, clock())), 201)
 
     @routes.delete("/rule/trial", response_model=TrialModel, responses=refused)
     async def end(_: Operator) -> Response:
         """End the trial; the answer is how it stood."""
-        return Json(TrialModel.of(await trials.end()))
+        return Json(TrialModel.of(trials.end()))
 
     @routes.post("/rule/trial/promote", response_model=RuleModel, responses=refused)
     async def promote(body: Promotion, who: Operator) -> Response:

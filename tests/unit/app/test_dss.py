@@ -33,7 +33,6 @@ async def test_mqtt_and_the_rule_loop_alone_share_the_fate_of_the_process(
         "loop-watch",
         "pictures",
         "recordings",
-        "shadow-rule",
     }
 
 

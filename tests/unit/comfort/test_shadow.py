@@ -1,13 +1,11 @@
 """The trial of a rule: what it compares, how it begins, lasts and ends."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from iveg.adapters.rules import TRIALS_FORM, FileTrials
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.errors import HopError, OutdatedError, TrialRefusedError
+from iveg.domain.errors import OutdatedError, TrialRefusedError
 from iveg.domain.parameters import ByClass
 from iveg.domain.rule.trial import Trial
 from iveg.domain.words import WordAnswer
@@ -139,59 +137,18 @@ def test_a_trial_that_cannot_judge_ends_and_is_named() -> None:
     assert desk.evaluator.speed_limits["AGI"].speed_factor == 0.5
 
 
-async def test_it_goes_on_after_a_restart_with_what_it_had(tmp_path: Path) -> None:
-    path = tmp_path / "trial.jsonl"
-    assert FileTrials(path).load() is None
-    desk = Desk()
-    begin(desk.parts, LAX, desk)
-    for number in range(40):
-        watch(desk, 1.5, *([0.85] if number >= 25 else []))
-    before = trial_of(desk)
-    await FileTrials(path).save(before)
-
-    kept = FileTrials(path).load()
-
-    assert kept == before
-    assert kept is not None
-    desk = Desk()
-    desk.parts.trials.start(kept, desk.clock())
-    again = trial_of(desk)
-    assert again.so_far == before.so_far
-    assert all(one.ended is not None for one in again.differences)
-    await FileTrials(path).save(None)
-    assert FileTrials(path).load() is None
-
-
-@pytest.mark.parametrize("line", ["nonsense", "{}", '{"rule": {"threshold": 2}}'])
-def test_a_file_that_cannot_be_read_tries_nothing(
-    tmp_path: Path, line: str, caplog: pytest.LogCaptureFixture
-) -> None:
-    path = tmp_path / "trial.jsonl"
-    path.write_text(f'{{"iveg": "{TRIALS_FORM.name}", "version": 1}}\n{line}\n')
-
-    assert FileTrials(path).load() is None
-    assert len(caplog.messages) == 1
-
-
 async def test_an_operator_begins_ends_and_promotes() -> None:
     desk = WebDesk()
     trials, at = desk.parts.trials, desk.clock()
     with pytest.raises(TrialRefusedError, match="none"):
-        await trials.end()
+        trials.end()
     with pytest.raises(TrialRefusedError, match="same"):
-        await trials.begin(replace(RULE, version=7, author="ben"), "ana", at)
-    desk.trial_store.full = True
-    with pytest.raises(HopError):
-        await trials.begin(LAX, "ana", at)
-    assert desk.parts.trials.current is None
-    desk.trial_store.full = False
-    await trials.begin(LAX, "ana", at)
+        trials.begin(replace(RULE, version=7, author="ben"), "ana", at)
+    trials.begin(LAX, "ana", at)
     with pytest.raises(TrialRefusedError, match="running"):
-        await trials.begin(STRICT, "ben", at)
+        trials.begin(STRICT, "ben", at)
     for number in range(40):
         watch(desk, 1.5, *([0.85] if number >= 25 else []))
-    await trials.save()
-    assert desk.trial_store.written == trials.current
     with pytest.raises(OutdatedError):
         await trials.promote("eva", desk.clock(), 9)
     tried = trials.current
@@ -204,5 +161,4 @@ async def test_an_operator_begins_ends_and_promotes() -> None:
     assert rule.comparison is not None
     assert rule.comparison.would_not > 0
     assert desk.rule_store.written == [rule]
-    assert desk.trial_store.written is None
     assert desk.parts.trials.current is None

@@ -67,7 +67,7 @@ class WebDesk(Desk):
             Credentials(LINK, API_TOKEN), self.people, self.trail
         )
         self.rules = self.parts.rules
-        self.rule_store, self.trial_store = self.choices.rules, self.choices.trial
+        self.rule_store = self.choices.rules
         self.detector_store = self.choices.out_of_service
         self.word_store = self.choices.words
         self.counters = Counter({"some": 1})

@@ -90,9 +90,9 @@ export function createRelease(app, card, robotId) {
   }
 
   function outcomeSaid() {
-    const said = order ? saidOfOrder(order) : [];
-    if (!said.length) return outcome ? i18n.t(outcome, { status }) : "";
-    return said.map(({ key, slots }) => i18n.t(key, slots)).join(" ");
+    if (!order) return outcome ? i18n.t(outcome, { status }) : "";
+    const { key, slots } = saidOfOrder(order);
+    return i18n.t(key, slots);
   }
 
   /** @param {Command} command */
@@ -195,22 +195,12 @@ function makeHold() {
  */
 
 /**
- * The outcome of a release or resume, with a note on a late IoT Agent.
+ * The outcome of a release or resume.
  *
  * @param {Command} order
- * @returns {import("../types.js").Sentence[]}
- */
-export function saidOfOrder({ state, reason, note }) {
-  const told = endOfOrder(state, reason);
-  return note ? [told, note] : [told];
-}
-
-/**
- * @param {string} state
- * @param {string | null} reason
  * @returns {import("../types.js").Sentence}
  */
-function endOfOrder(state, reason) {
+export function saidOfOrder({ state, reason }) {
   if (state === "RELEASING") return { key: "release.sent", slots: {} };
   if (state === "EXPIRED") return { key: "release.unconfirmed", slots: {} };
   if (reason === null) return { key: "release.confirmed", slots: {} };

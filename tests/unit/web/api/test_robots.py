@@ -71,33 +71,7 @@ async def test_a_robot_that_is_to_stop_is_told_with_its_command() -> None:
     assert told["stop"]["requested_by"] == "ana"
     assert told["stop"]["transports"] == {"direct": "ok", "fiware": "pending"}
     assert told["stop"]["hold_id"] == told["stop"]["command_id"]
-    assert told["stop"]["note"] is None
     assert not told["stop"]["challenge_fresh"]
-
-
-@pytest.mark.parametrize(
-    ("direct", "lag_s", "key"),
-    [
-        (True, 0.4, None),
-        (True, 12.34, "stop.note.direct"),
-        (False, 12.34, "stop.note.fiware"),
-    ],
-)
-async def test_an_order_says_what_a_late_agent_means_for_it(
-    direct: bool, lag_s: float, key: str | None
-) -> None:
-    desk = WebDesk()
-    desk.fleet.fails = not direct
-    desk.lag(lag_s)
-    await desk.commander.stop(["AGI"], "ana", desk.clock())
-    await settle()
-
-    told = desk.views.robot("AGI", desk.clock()).stop
-
-    assert told is not None
-    note = told.note
-    assert (None if note is None else note.key) == key
-    assert note is None or note.slots == {"lag": 12.3}
 
 
 async def test_13_11_the_server_tells_when_each_device_was_last_heard_of() -> None:

@@ -27,7 +27,7 @@ async def get(desk: WebDesk, path: str = "") -> Any:
 async def test_a_change_is_a_new_version_with_author_and_time() -> None:
     desk = WebDesk()
 
-    answer = await put(desk, confidence_threshold=0.6, possible_people=True)
+    answer = await put(desk, confidence_threshold=0.6)
 
     assert answer.status_code == 200
     told = await get(desk)
@@ -134,7 +134,6 @@ async def test_of_two_changes_at_once_one_counts() -> None:
         {"aliases": {"person": "robot"}},
         {"aliases": {" ": "person"}},
         {"aliases": {str(n): "person" for n in range(201)}},
-        {"possible_people": False},
         {"factor": 0.9},
     ],
     ids=str,
