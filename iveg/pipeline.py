@@ -11,7 +11,7 @@ from functools import partial
 from iveg.comfort.equipment import PART as EQUIPMENT
 from iveg.comfort.equipment import EquipmentMonitor
 from iveg.comfort.goals import GoalDispatcher
-from iveg.comfort.maps import CoverageMonitor, Mapper, PeerScans, ScanReader
+from iveg.comfort.maps import CoverageMonitor, Mapper, PeerScans
 from iveg.comfort.margins import NewestMargins
 from iveg.comfort.trials import Trials
 from iveg.domain.equipment import Equipment, Tile
@@ -70,7 +70,6 @@ class Pipeline:
     detectors: Detectors
     things: ThingMarks
     latency: LatencyWatch
-    scans: ScanReader
     goals: GoalDispatcher
     equipment: EquipmentMonitor
     peer_scans: PeerScans
@@ -100,7 +99,7 @@ def build(
         LatencyWatch(world.robots, world.ledger.composed_at),
     )
     evaluator, commander = Evaluator(core, kept.rules[-1]), Commander(core)
-    rules, scans = Rules(core, evaluator, kept), ScanReader(ingest.reject)
+    rules = Rules(core, evaluator, kept)
     goals = GoalDispatcher(core, commander.machines)
     equipment = EquipmentMonitor(core, Equipment(choices.tiles, ports.clock()))
     supervision.listen("live", changed=hub.changed, appended=hub.append)
@@ -124,11 +123,10 @@ def build(
         Detectors(core, kept),
         ThingMarks(core),
         latency,
-        scans,
         goals,
         equipment,
-        PeerScans(world, scans, ports.fleet.publish_peer_scan, choices.boot),
-        Mapper(world, greenhouse.bounds, scans),
+        PeerScans(world, ports.fleet.publish_peer_scan, choices.boot),
+        Mapper(world, greenhouse.bounds),
         CoverageMonitor(world, greenhouse),
         Trials(core, evaluator, rules, kept.trial),
     )

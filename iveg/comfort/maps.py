@@ -1,9 +1,8 @@
 """Maps beside the rule loop: costmaps of scans, scans for peers, camera coverage.
 
 No robot stops for any of them.  A scan costs about as much as a hundred decisions, so
-one at a time is read and drawn, the newest of the robot that has waited longest; a
-fleet that sends more is drawn less often.  A scan that cannot be read or drawn is
-refused with its reason, and nothing else notices.
+one at a time is drawn, the newest of the robot that has waited longest; a
+fleet that sends more is drawn less often.
 """
 
 from collections.abc import Callable, Iterable
@@ -19,10 +18,9 @@ from iveg.domain.costmap import (
     window_round,
 )
 from iveg.domain.coverage import AisleCoverage
-from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.observations import Instant, LaserScan, Origin, UnreadScan
+from iveg.domain.observations import Instant, LaserScan, Origin
 from iveg.domain.peer_scan import OLDEST_S, PeerScan, peer_scan_of
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.zones import Zone
@@ -37,42 +35,6 @@ APART_S = 0.5
 _PERIOD_S = 0.25
 _WIDEST_M = 1000.0
 """Longer than any greenhouse: an open field, mapped in a window round the robots."""
-Reject = Callable[[str, str, str], None]
-
-
-class ScanReader:
-    """The newest scan of each robot, read when it is first asked for.
-
-    Args:
-        reject: Told of a scan that is refused: robot, reason, detail.
-    """
-
-    def __init__(self, reject: Reject) -> None:
-        self.reject = reject
-        self._read: dict[str, tuple[UnreadScan, LaserScan | None]] = {}
-
-    def newest(self, robot: RobotState) -> LaserScan | None:
-        """A robot's newest scan; None where there is none that can be read."""
-        scan = robot.scan
-        if scan is None or isinstance(scan, LaserScan):
-            return scan
-        known = self._read.get(robot.robot_id)
-        if known is None or known[0] is not scan:
-            known = self._read[robot.robot_id] = scan, self._of(scan)
-        return known[1]
-
-    def undrawable(self, robot_id: str, error: Exception) -> None:
-        """Refuse a scan that was read and cannot be drawn."""
-        self.reject(robot_id, "undrawable_scan", repr(error))
-
-    def _of(self, scan: UnreadScan) -> LaserScan | None:
-        try:
-            return scan.read()
-        except UnreadableError as error:
-            self.reject(scan.robot_id, error.reason, error.detail)
-        except Exception as error:
-            self.reject(scan.robot_id, "unreadable_scan", repr(error))
-        return None
 
 
 class _Turns:
@@ -84,7 +46,7 @@ class _Turns:
 
     def __init__(self, apart_s: float) -> None:
         self._apart_s = apart_s
-        self._taken: dict[str, tuple[float, LaserScan | UnreadScan]] = {}
+        self._taken: dict[str, tuple[float, LaserScan]] = {}
 
     def next(self, robots: Iterable[RobotState], now: Instant) -> RobotState | None:
         """Take the turn of a robot with a new scan; None: none is due."""
@@ -114,11 +76,10 @@ class Mapper:
 
     Args:
         bounds: The outer wall of the greenhouse.
-        scans: Reads them.
     """
 
-    def __init__(self, world: World, bounds: Rectangle, scans: ScanReader) -> None:
-        self._world, self._scans = world, scans
+    def __init__(self, world: World, bounds: Rectangle) -> None:
+        self._world = world
         wide = max(bounds.xmax - bounds.xmin, bounds.ymax - bounds.ymin)
         self._is_open = wide > _WIDEST_M
         self._grid = None if self._is_open else Grid.over(bounds)
@@ -150,15 +111,10 @@ class Mapper:
 
     def _draw(self, robot: RobotState, now: Instant) -> None:
         self._place()
-        scan, pose = self._scans.newest(robot), robot.scan_pose
+        scan, pose = robot.scan, robot.scan_pose
         if scan is None or pose is None or self._grid is None:
             return
-        try:
-            sweep = sweep_of(scan, pose, self._grid)
-        except Exception as error:
-            # One robot's scan ends neither this part nor the drawing of the others.
-            self._scans.undrawable(robot.robot_id, error)
-            return
+        sweep = sweep_of(scan, pose, self._grid)
         for key in (None, robot.robot_id):
             self._drawn[key] = _added(self._drawn.get(key), self._grid, sweep, now)
 
@@ -196,19 +152,14 @@ class PeerScans:
     Never two in one turn, so that no feedback waits behind a burst.
 
     Args:
-        scans: Reads them.
         publish: Takes what is told.
         boot: Of iVeg, as in feedback.
     """
 
     def __init__(
-        self,
-        world: World,
-        scans: ScanReader,
-        publish: Callable[[PeerScan], None],
-        boot: str,
+        self, world: World, publish: Callable[[PeerScan], None], boot: str
     ) -> None:
-        self._world, self._scans, self._publish = world, scans, publish
+        self._world, self._publish = world, publish
         self._boot, self._seq = boot, 0
         self._turns = _Turns(APART_S)
 
@@ -228,15 +179,10 @@ class PeerScans:
             self._publish_scan(robot, now)
 
     def _publish_scan(self, robot: RobotState, now: Instant) -> None:
-        scan, pose = self._scans.newest(robot), robot.scan_pose
+        scan, pose = robot.scan, robot.scan_pose
         if scan is None or pose is None or not scan.ranges.size:
             return
-        try:
-            peer_scan = peer_scan_of(scan, pose, max(0.0, _age_s(robot, now)))
-        except Exception as error:
-            # One robot's scan ends neither this part nor what others are told.
-            self._scans.undrawable(robot.robot_id, error)
-            return
+        peer_scan = peer_scan_of(scan, pose, max(0.0, _age_s(robot, now)))
         self._seq += 1
         origin = Origin(self._boot, self._seq, format_stamp(now.wall))
         self._publish(replace(peer_scan, origin=origin))

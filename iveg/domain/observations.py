@@ -5,7 +5,7 @@ at its members.  Names are those of ``nav_msgs``, ``sensor_msgs`` and the NGSI e
 times are Unix seconds unless said otherwise.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
@@ -447,17 +447,6 @@ class HeartbeatProbe(Observation):
     robot_id: str = field(default="", init=False)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class UnreadScan(Observation):
-    """A scan of which only the identity is read: nothing else of it slows a robot.
-
-    Attributes:
-        read: The scan.  Raises UnreadableError.
-    """
-
-    read: Callable[[], LaserScan]
-
-
 @dataclass(frozen=True, slots=True)
 class Overtaken(Observation):
     """A message older than its stream, reduced to its identity.
@@ -484,8 +473,6 @@ def kind_of(observation: Observation) -> type[Observation]:
             return observation.kind
         case RefusedFrame():
             return DetectionFrame
-        case UnreadScan():
-            return LaserScan
     return type(observation)
 
 

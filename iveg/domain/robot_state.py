@@ -30,7 +30,6 @@ from iveg.domain.observations import (
     Overtaken,
     Received,
     SafetyReport,
-    UnreadScan,
     kind_of,
 )
 from iveg.domain.stream_order import OrderVerdict, PresentBoot, StreamOrder
@@ -148,7 +147,7 @@ class RobotState:
     estimated_since: float | None = None
     unproven_since: float | None = None
     alive_since: float | None = None
-    scan: LaserScan | UnreadScan | None = None
+    scan: LaserScan | None = None
     scan_pose: Pose2D | None = None
     scan_received: Instant | None = None
     frame: DetectionFrame | None = None
@@ -356,7 +355,7 @@ def apply_newest(robot: RobotState, received: Received, moment: float | None) ->
     match observation:
         case Odometry():
             _drive(robot, observation, received, moment)
-        case LaserScan() | UnreadScan():
+        case LaserScan():
             robot.scan, robot.scan_received = observation, dated(at, moment)
             robot.scan_pose = robot.pose_at_stamp(observation.origin.own_s)
         case DetectionFrame():

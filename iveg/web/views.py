@@ -62,7 +62,6 @@ class Views:
         self._evaluator, self._commander = parts.evaluator, parts.commander
         self._goals = parts.goals
         self._situations = Situations(parts.evaluator)
-        self.scans = parts.scans
         self._world, self._people = parts.core.world, parts.core.people
         self._greenhouse = parts.evaluator.greenhouse
         self._event_log = parts.core.event_log
@@ -170,7 +169,7 @@ class Views:
     def scan(self, robot_id: str) -> Scan:
         """The newest sweep of one robot, as points in ``map``."""
         robot = self._world.robot(robot_id)
-        scan = self.scans.newest(robot)
+        scan = robot.scan
         if scan is None or robot.scan_pose is None:
             return Scan(robot_id=robot_id, stamp=None, points=[])
         swept = scan.points(robot.scan_pose).tolist()

@@ -12,7 +12,7 @@ from iveg.lab.emulator.world import EMULATED
 from iveg.robot.ros2.topics import ROS_SENSORS
 from tests.processes import ROOT
 
-_RECEIVED_AS_ANOTHER = {"Overtaken", "RefusedFrame", "UnreadScan", "Unplaced"}
+_RECEIVED_AS_ANOTHER = {"Overtaken", "RefusedFrame", "Unplaced"}
 
 
 def words_of(kind: Kind) -> set[str]:

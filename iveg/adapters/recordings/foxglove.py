@@ -25,7 +25,6 @@ from iveg.domain.observations import (
     Observation,
     Odometry,
     Received,
-    UnreadScan,
     kind_of,
 )
 from iveg.ngsi.codec import read_notification
@@ -130,7 +129,7 @@ DRAWN_APART_S: dict[type[Observation], float] = {
 }
 """What viewers draw, and the least time between two of a robot (s)."""
 _EARLY = 0.95
-_DRAWN = Odometry | LaserScan | UnreadScan | DetectionFrame
+_DRAWN = Odometry | LaserScan | DetectionFrame
 _Stream = tuple[str, type[Observation]]
 
 
@@ -185,23 +184,17 @@ class Drawing:
         return False
 
     def _draw(self, observation: Observation) -> None:
-        """Have one drawn that is due.  Raises UnreadableError."""
+        """Have one drawn that is due."""
         stream = observation.robot_id, kind_of(observation)
         is_ours = observation.robot_id in self._robots
         if is_ours and isinstance(observation, _DRAWN) and self._is_due(stream):
-            one = _read(observation)
-            if isinstance(one, LaserScan) and not one.ranges.size:
+            if isinstance(observation, LaserScan) and not observation.ranges.size:
                 # A twin without its numbers takes nobody's turn.
                 return
-            self._found.append(one)
+            self._found.append(observation)
             apart_s = DRAWN_APART_S[kind_of(observation)] * _EARLY
             self._due[stream] = self._at.mono + apart_s
 
     def _is_due(self, stream: _Stream) -> bool:
         is_drawn = stream[1] in DRAWN_APART_S
         return is_drawn and self._at.mono >= self._due.get(stream, float("-inf"))
-
-
-def _read(observation: Observation) -> Observation:
-    """The observation itself; a scan that nobody has read yet is read now."""
-    return observation.read() if isinstance(observation, UnreadScan) else observation

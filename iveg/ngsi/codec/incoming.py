@@ -37,7 +37,6 @@ from iveg.domain.observations import (
     Overtaken,
     RefusedFrame,
     SafetyReport,
-    UnreadScan,
 )
 from iveg.domain.wire import (
     MAX_BEAMS,
@@ -260,31 +259,6 @@ def _refuse_elsewhere(robot_id: str, header: object) -> None:
         raise UnreadableError("unknown_frame", f"{names.LIDAR}: {frame}")
 
 
-def _identify_scan(
-    points: str, robot_id: str, attributes: Mapping[str, object]
-) -> UnreadScan:
-    """Read a scan's identity alone: its numbers are for eyes, which read them once."""
-    header = attributes.get(names.LIDAR_HEADER)
-    _refuse_elsewhere(robot_id, header)
-    origin = Origin() if header is None else read_origin(header)
-    kept = {points: _compact(attributes[points]), names.LIDAR_HEADER: header}
-    return UnreadScan(robot_id, origin, partial(_read_later, robot_id, kept))
-
-
-def _read_later(robot_id: str, attributes: Mapping[str, object]) -> LaserScan:
-    """The scan.
-
-    Raises:
-        UnreadableError: it is none.
-    """
-    reading = read_attributes(robot_id, attributes)
-    for scan in reading.observations:
-        if isinstance(scan, LaserScan):
-            return scan
-    (problem,) = reading.problems
-    raise UnreadableError(problem.reason, problem.detail)
-
-
 # --- attributes -------------------------------------------------------------------
 
 
@@ -331,9 +305,6 @@ _READERS: Mapping[str, Reader] = {
 }
 _RANK = {name: rank for rank, name in enumerate(_READERS)}
 _FRAMES = frozenset({names.BOXES, "class"})
-_IDENTIFIERS: Mapping[str, Reader] = {
-    name: partial(_identify_scan, name) for name in (names.LIDAR, "laser_scan")
-}
 _IDENTITY: Mapping[str, tuple[type[Odometry | LaserScan | DetectionFrame], str]] = {
     names.ODOMETRY: (Odometry, names.ODOMETRY),
     names.LIDAR: (LaserScan, names.LIDAR_HEADER),
@@ -350,19 +321,16 @@ def read_attributes(
     Args:
         robot_id: Whose they are.
         attributes: By name.
-        is_past: Tells by its identity what need not be read; numbers of scans are left
-            to those who draw them.  None reads all.
+        is_past: Tells by its identity what need not be read; None reads all.
     """
     readings = []
     for name in sorted(attributes.keys() & _READERS.keys(), key=_RANK.__getitem__):
         if attributes[name] is None:
             continue
         reader = _READERS[name]
-        if is_past is not None:
-            reader = _IDENTIFIERS.get(name, reader)
-            if old := _overtaken(robot_id, name, attributes, is_past):
-                readings.append(old)
-                continue
+        if is_past and (old := _overtaken(robot_id, name, attributes, is_past)):
+            readings.append(old)
+            continue
         readings.append(_read(robot_id, reader, attributes, name))
     return readings[0] if len(readings) == 1 else merge(readings)
 

@@ -21,7 +21,6 @@ from iveg.domain.observations import (
     Observation,
     Odometry,
     Origin,
-    UnreadScan,
 )
 from iveg.domain.wire import (
     FORBIDDEN,
@@ -257,10 +256,7 @@ def _played(channel: Channel, payload: bytes) -> Iterator[Played]:
             observations = codec.read_notification(payload)[1].observations
         else:
             return
-        for one in observations:
-            read = one.read() if isinstance(one, UnreadScan) else one
-            if isinstance(read, get_args(Played)):
-                yield read
+        yield from (one for one in observations if isinstance(one, get_args(Played)))
     except UnreadableError:
         return
 

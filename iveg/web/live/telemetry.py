@@ -145,12 +145,7 @@ class TelemetryEncoder:
     def _encode(self, topic: str, version: int, now: Instant) -> Part | None:
         row, robot_id = topics.find(topic)
         if row is topics.SCAN:
-            try:
-                return self._scan(topic, robot_id, version, now)
-            except Exception as error:
-                # Else it would end the line of every browser.
-                self._views.scans.undrawable(robot_id, error)
-                return None
+            return self._scan(topic, robot_id, version, now)
         data = self._views.frame(robot_id, now)
         if data is None:
             return None
@@ -161,7 +156,7 @@ class TelemetryEncoder:
         self, topic: str, robot_id: str, version: int, now: Instant
     ) -> Part | None:
         robot = self._views.robot_state(robot_id)
-        scan = self._views.scans.newest(robot)
+        scan = robot.scan
         if scan is None or robot.scan_pose is None:
             return None
         sensor = robot.scan_pose.compose(scan.mount)

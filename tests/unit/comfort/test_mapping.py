@@ -2,14 +2,13 @@
 
 import math
 
-from iveg.comfort.maps import Mapper, ScanReader
+from iveg.comfort.maps import Mapper
 from iveg.domain.costmap import InflatedGrid
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.rule.zones import Zone
 from tests.builders import at, scan
 from tests.unit.domain.scene import Scene
 
-READER = ScanReader(lambda *_: None)
 ROOM = Rectangle(0, 0, 20, 20)
 OPEN_FIELD = Rectangle(-1e6, -1e6, 1e6, 1e6)
 PERSON = Zone("person", "P1", "AGI", 15.0, 15.0, 2.0, 2.0)
@@ -20,7 +19,7 @@ class Field(Scene):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.mapper = Mapper(self.world, ROOM, READER)
+        self.mapper = Mapper(self.world, ROOM)
 
     def sweep_from(self, robot_id: str, x: float, y: float = 5.0) -> None:
         """Something stands three metres off all round."""
@@ -82,24 +81,9 @@ def test_whom_a_recording_saw_is_not_laid_over_today() -> None:
     assert not knows(field.shared(recorded), 15.0, 15.0)
 
 
-def test_f60_a_scan_that_cannot_be_drawn_is_refused_and_the_others_are_drawn() -> None:
-    field, refused = Field(), list[tuple[str, str]]()
-    scans = ScanReader(lambda robot, why, _: refused.append((robot, why)))
-    field.mapper = Mapper(field.world, ROOM, scans)
-    field.sweep_from("AGI", 5.0)
-    field.sweep_from("AGII", 15.0)
-    flat = scan("AGI", [3.0] * 360, angle_increment=0.0, range_max=12.0)
-    field.world.robot("AGI").scan = flat
-    field.tick()
-    field.tick()
-
-    assert refused == [("AGI", "undrawable_scan")]
-    assert knows(field.shared(), 16.0)
-
-
 def test_in_an_open_field_the_costmap_goes_with_the_robots() -> None:
     field = Field()
-    field.mapper = Mapper(field.world, OPEN_FIELD, READER)
+    field.mapper = Mapper(field.world, OPEN_FIELD)
     field.sweep_from("AGI", 500.0)
     field.tick()
     first = field.shared().grid

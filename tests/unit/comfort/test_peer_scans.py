@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from iveg.comfort.maps import PeerScans, ScanReader
+from iveg.comfort.maps import PeerScans
 from iveg.domain.geometry import Pose2D
 from iveg.domain.peer_scan import PeerScan
 from tests.builders import at, safety_report, scan
@@ -16,9 +16,7 @@ class Field(Scene):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.told: list[PeerScan] = []
-        self.refused: list[tuple[str, str, str]] = []
-        reader = ScanReader(lambda *one: self.refused.append(one))
-        self.part = PeerScans(self.world, reader, self.told.append, "b")
+        self.part = PeerScans(self.world, self.told.append, "b")
 
     def laser(self, robot_id: str, *, placed: bool = True) -> None:
         robot = self.world.robot(robot_id)
@@ -79,18 +77,3 @@ def test_a_scan_without_a_place_or_long_ago_is_not_sent() -> None:
     field.pass_s(0.2)
 
     assert field.heard() == []
-
-
-def test_a_scan_that_cannot_be_thinned_is_refused_and_others_go_on() -> None:
-    field = Field()
-    field.laser("AGI")
-    robot = field.world.robot("AGI")
-    robot.scan = scan("AGI", [1.0, 2.0], angle_increment=0.0)
-    field.tell("AGI", asks=True)
-    field.tell("AGII", asks=True)
-    field.pass_s(0.2)
-    field.laser("AGII")
-    field.pass_s(0.2)
-
-    assert field.heard() == ["AGII"]
-    assert [reason for _, reason, _ in field.refused] == ["undrawable_scan"]

@@ -1,10 +1,10 @@
-"""Scans are read where they are drawn, once each, and refused there."""
+"""Scans that are refused."""
 
 from typing import Any
 
 import orjson
 
-from iveg.domain.observations import LaserScan, Received, UnreadScan
+from iveg.domain.observations import Received
 from iveg.ngsi import codec
 from tests.builders import odometry, scan
 from tests.unit.vital.desk import Desk
@@ -23,35 +23,14 @@ def hear(desk: Desk, payload: bytes) -> list[str]:
     return [one.reason for one in reading.problems]
 
 
-def newest(desk: Desk) -> LaserScan | None:
-    return desk.parts.scans.newest(desk.world.robot("AGI"))
-
-
-def test_a_scan_is_read_when_it_is_drawn_and_once() -> None:
+def test_f60_a_scan_that_cannot_be_read_is_refused_and_all_else_is_taken() -> None:
     desk = Desk()
-    hear(desk, measure())
-    first, second = newest(desk), newest(desk)
-
-    assert isinstance(desk.world.robot("AGI").scan, UnreadScan)
-    assert first is not None
-    assert first is second
-    assert first.ranges.tolist() == scan().ranges.tolist()
-    assert first.origin == scan().origin
-
-
-def test_f60_a_scan_that_cannot_be_read_is_refused_by_those_who_draw_it() -> None:
-    desk = Desk()
-    at_once = hear(desk, measure(lidar_points=["near", "far"]))
+    reasons = hear(desk, measure(lidar_points=["near", "far"]))
     desk.hear(odometry("AGII"))
-    shown = newest(desk), newest(desk)
 
-    assert at_once == []
-    assert shown == (None, None)
-    assert desk.ingest.counters["rejected.bad_lidar_points"] == 1
-    rejected = [
-        line.slots for line in desk.event_log.lines if line.key == "log.rejected"
-    ]
-    assert rejected == [{"source": "AGI", "reason": "bad_lidar_points"}]
+    assert reasons == ["bad_lidar_points"]
+    assert desk.world.robot("AGI").scan is None
+    assert desk.world.robot("AGII").odometry is not None
 
 
 def test_a_scan_whose_identity_cannot_be_read_is_refused_at_once() -> None:

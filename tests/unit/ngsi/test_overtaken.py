@@ -17,7 +17,6 @@ from iveg.domain.observations import (
     Origin,
     Overtaken,
     Received,
-    UnreadScan,
 )
 from iveg.domain.transports import FIWARE
 from iveg.domain.world import World
@@ -118,8 +117,6 @@ class Listener:
         robot = self.world.robots["AGI"]
         known = robot.odometry, robot.pose_at, robot.heard_at, robot.detections_at
         scan = robot.scan
-        if isinstance(scan, UnreadScan):
-            scan = scan.read()
         swept = isinstance(scan, LaserScan) and (scan.origin, scan.ranges.tolist())
         frame = robot.frame and robot.frame.origin
         return (*known, swept, frame, robot.clock, dict(self.world.counters))

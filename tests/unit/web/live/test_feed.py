@@ -1,7 +1,7 @@
 """Telemetry of one browser: the newest of what changed, in a window, at its pace."""
 
 import struct
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -249,20 +249,3 @@ def test_a_scan_is_ranges_in_integers_finer_than_a_centimetre(
 def _wide_scan(desk: WebDesk, robot_id: str, beams: int = 720) -> Any:
     ranges = np.linspace(1.0, 9.0, beams, dtype=np.float32)
     return scan(robot_id=robot_id, origin=desk.next_origin(), ranges=ranges)
-
-
-def test_f60_a_scan_that_cannot_be_written_is_refused_and_all_else_is_told(
-    page: Page,
-) -> None:
-    page.desk.drive("AGI")
-    page.desk.hear(scan(origin=page.desk.next_origin()))
-    robot = page.desk.world.robot("AGI")
-    assert robot.scan is not None
-    robot.scan = replace(robot.scan, mount=None)  # type: ignore[arg-type]
-
-    frame = page.read()
-
-    assert frame is not None
-    assert [move[0] for move in frame["moves"]] == ["AGI"]
-    assert frame["scans"] == []
-    assert page.desk.ingest.counters["rejected.undrawable_scan"] == 1
