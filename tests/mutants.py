@@ -410,12 +410,6 @@ MUTANTS = (
         "if False:",
         ("unit/ngsi/test_codec_hostile.py",),
     ),
-    Mutant(
-        "freshness: one number that leaps makes all true ones late",
-        "if seq - self.seq > _LEAP and not self._goes_on(seq):",
-        "if False:",
-        ("unit/domain/test_order.py",),
-    ),
 )
 
 

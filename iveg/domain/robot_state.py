@@ -142,6 +142,7 @@ class RobotState:
     description: RobotDescription
     odometry: Odometry | None = None
     odometry_received: Instant | None = None
+    odometry_transport: TransportId = FIWARE.id
     pose_at: float | None = None
     estimated_since: float | None = None
     unproven_since: float | None = None
@@ -402,6 +403,7 @@ def _drive(
     if heard is None or at.mono - heard.mono > LIMITS.silence_s:
         robot.alive_since = at.mono
     robot.odometry, robot.odometry_received = odometry, at
+    robot.odometry_transport = received.transport
     if before is not None and before.origin.boot != origin.boot:
         robot.forget_poses()  # another boot counts its seconds anew
     robot.remember_pose(at.wall if origin.own_s is None else origin.own_s, pose)

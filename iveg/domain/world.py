@@ -7,7 +7,7 @@ transport that feeds each robot; what contradicts physics; and other servers' fe
 """
 
 from bisect import bisect_right
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import inf
@@ -37,7 +37,7 @@ from iveg.domain.observations import (
 from iveg.domain.probe import ProbeLag
 from iveg.domain.robot_state import RobotState, apply_newest, dated, learn_kind
 from iveg.domain.stream_order import OrderVerdict
-from iveg.domain.transports import DIRECT, FIWARE, TransportId
+from iveg.domain.transports import FIWARE
 from iveg.domain.words import WordAnswers
 
 # --- proven age -------------------------------------------------------------------
@@ -87,47 +87,8 @@ class FeedbackLedger:
         return None if index < 0 else self._moments[index]
 
 
-# --- feeds ------------------------------------------------------------------------
-#
-# Odometry and scans come twice, straight from MQTT and through Orion.
-
-SILENT_S = 1.0
+_SILENT_S = 1.0
 """A direct copy older than this is missed."""
-OVERTAKES_S = 0.2
-"""A message through FIWARE so long after the last direct one is no twin."""
-
-
-@dataclass(slots=True)
-class Feed:
-    """One kind of telemetry of one robot, on both transports (monotonic s).
-
-    Attributes:
-        direct_at: Arrival of the newest direct message; ``fiware_at`` of Orion's.
-    """
-
-    direct_at: float = float("-inf")
-    fiware_at: float = float("-inf")
-    _direct: TransportId = DIRECT.id
-
-    def heard(self, transport: TransportId, at: float) -> None:
-        """A message came."""
-        if transport == FIWARE.id:
-            self.fiware_at = at
-        else:
-            self.direct_at, self._direct = at, transport
-
-    def is_direct(self, now: float) -> bool:
-        """Whether the direct copy is fresh."""
-        return now - self.direct_at <= SILENT_S
-
-    def transport(self, now: float) -> TransportId:
-        """Which one brings what counts; of a silent robot, which one did."""
-        has_fallen_back = (
-            not self.is_direct(now) and self.fiware_at > self.direct_at + OVERTAKES_S
-        )
-        is_unheard = self.direct_at == float("-inf")
-        return FIWARE.id if is_unheard or has_fallen_back else self._direct
-
 
 # --- contradictions ---------------------------------------------------------------
 #
@@ -332,7 +293,8 @@ class World:
         self.climate: Climate | None = None
         self.climate_received: Instant | None = None
         self.counters: Counter[str] = Counter()
-        self._feeds = defaultdict[tuple[str, type[Observation]], Feed](Feed)
+        self._direct_at: dict[tuple[str, type[Observation]], float] = {}
+        """Arrival of the newest direct message by robot and kind (monotonic, s)."""
         self.returned_detectors: list[str] = []
         self.word_answers = WordAnswers()
 
@@ -346,10 +308,6 @@ class World:
             return self.robots[robot_id]
         except KeyError:
             raise UnknownRobotError(robot_id) from None
-
-    def feed(self, robot_id: str, kind: type[Observation] = Odometry) -> Feed:
-        """The transports of one kind of telemetry of a robot."""
-        return self._feeds[robot_id, kind]
 
     def is_refused(self, robot_id: str) -> bool:
         """Whether a setting says that a robot is not heard."""
@@ -390,7 +348,7 @@ class World:
         learn_kind(robot, received, origin)
         verdict = robot.judge(received, origin, self.ledger.composed_at(*origin.echoes))
         if not received.asked:
-            verdict = self._fed(robot, received, origin, verdict)
+            verdict = self._fed(received, verdict)
         self.counters[f"{kind_of(observation).__name__}.{verdict}"] += 1
         if verdict == "duplicate" or (received.asked and origin.seq is None):
             return "duplicate"
@@ -531,22 +489,17 @@ class World:
             return robot.pose_at if robot.estimated_since is None else None
         return None
 
-    def _fed(
-        self,
-        robot: RobotState,
-        received: Received,
-        origin: Origin,
-        verdict: OrderVerdict,
-    ) -> OrderVerdict:
-        """Note which transport brought it; without a count the direct copy wins."""
-        kind = kind_of(received.observation)
-        if kind not in (Odometry, LaserScan):
+    def _fed(self, received: Received, verdict: OrderVerdict) -> OrderVerdict:
+        """The verdict; without a count Orion's copy of a direct message is none."""
+        observation, at = received.observation, received.at.mono
+        key = observation.robot_id, kind_of(observation)
+        if key[1] not in (Odometry, LaserScan):
             return verdict
-        feed = self.feed(robot.robot_id, kind)
-        at, counted = received.at.mono, origin.seq is not None
-        if received.transport == FIWARE.id and not counted and feed.is_direct(at):
-            verdict = "duplicate"
-        feed.heard(received.transport, at)
+        if received.transport != FIWARE.id:
+            self._direct_at[key] = at
+        elif observation.origin.seq is None:
+            direct_at = self._direct_at.get(key, -inf)
+            return "duplicate" if at - direct_at <= _SILENT_S else verdict
         return verdict
 
     def live_robots(self) -> Iterable[RobotState]:

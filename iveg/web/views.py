@@ -126,7 +126,7 @@ class Views:
             goal=None if goal is None else Goal.of(goal),
             replay=robot.is_replay,
             clock_offset_s=robot.clock.offset_s(now),
-            transport=self._world.feed(robot_id).transport(now.mono),
+            transport=robot.odometry_transport,
             profile=Profile.from_value(robot.profile),
             margin=Margin.of(self._margin(robot, margins, now)),
             cmd_status=robot.command_status,

@@ -39,7 +39,7 @@ from iveg.lab.embedded.mqtt_broker import MqttBroker
 # --- groups and devices -----------------------------------------------------------
 
 _Read = TypeVar("_Read", bound="_Provisioned")
-_NONE_YET = Field([], max_length=0)
+_NONE_YET: list[object] = Field([], max_length=0)
 """What the embedded agent cannot do is refused, not ignored."""
 
 

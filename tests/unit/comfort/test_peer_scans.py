@@ -82,18 +82,3 @@ def test_a_scan_without_a_place_or_long_ago_is_not_sent() -> None:
     field.pass_s(0.2)
 
     assert field.heard() == []
-
-
-def test_a_scan_that_cannot_be_thinned_is_refused_and_others_go_on() -> None:
-    field = Field()
-    field.laser("AGI")
-    robot = field.world.robot("AGI")
-    robot.scan = scan("AGI", [1.0, 2.0], angle_increment=0.0)
-    field.tell("AGI", asks=True)
-    field.tell("AGII", asks=True)
-    field.pass_s(0.2)
-    field.laser("AGII")
-    field.pass_s(0.2)
-
-    assert field.heard() == ["AGII"]
-    assert [reason for _, reason, _ in field.refused] == ["undrawable_scan"]
