@@ -256,5 +256,5 @@ def _checked(line: bytes) -> tuple[str, Any]:
         raise ValueError("another checksum")
     row = _READ[kind].validate_json(written, strict=True)
     if isinstance(row, Session):
-        bytes.fromhex(row.digest)
+        bytes.fromhex(row.digest)  # nobody finds a session by another digest
     return kind, row

@@ -10,44 +10,58 @@ import sys
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Final, ParamSpec, TypeVar
+from typing import Final, TypeVar
 
 from cryptography.exceptions import InvalidKey
 from cryptography.hazmat.primitives.kdf.argon2 import Argon2id
 
 from iveg.domain.errors import BusyError
 
-_P = ParamSpec("_P")
+LEAST, MOST = 10, 256
+"""Characters of a password."""
 _T = TypeVar("_T")
 _MOST_WAITING: Final = 16
 _NICENESS: Final = 10
+_KIB, _PASSES, _LANES = 19 * 1024, 2, 1
+"""OWASP Password Storage Cheat Sheet."""
 
 
-class BoundedThread:
-    """Does one thing after the other; at most sixteen wait.
+class Passwords:
+    """Hashes and checks passwords one after the other; at most sixteen wait."""
 
-    Args:
-        name: Of the thread.
-    """
-
-    def __init__(self, name: str) -> None:
-        self._thread = ThreadPoolExecutor(1, name, _step_back)
+    def __init__(self) -> None:
+        self._thread = ThreadPoolExecutor(1, "passwords", _step_back)
         self._waiting = 0
+        self._nobodys = ""
 
-    async def run(
-        self, work: Callable[_P, _T], *args: _P.args, **named: _P.kwargs
-    ) -> _T:
-        """Result of a call.
+    async def hashed(self, password: str) -> str:
+        """The hash to keep (PHC string format).
 
         Raises:
             BusyError: too many wait.
         """
+        return await self._run(_hash, password)
+
+    async def fits(self, password: str, kept: str) -> bool:
+        """Whether a password is the one whose hash is kept.
+
+        An empty hash takes the same time as a wrong password: nobody learns by it which
+        names exist.
+
+        Raises:
+            BusyError: too many wait.
+        """
+        if not self._nobodys:
+            self._nobodys = await self._run(_hash, "")
+        fits = await self._run(_fits, password, kept or self._nobodys)
+        return fits and bool(kept)
+
+    async def _run(self, work: Callable[..., _T], *texts: str) -> _T:
         if self._waiting >= _MOST_WAITING:
             raise BusyError
         self._waiting += 1
         try:
-            done = self._thread.submit(work, *args, **named)
-            return await asyncio.wrap_future(done)
+            return await asyncio.wrap_future(self._thread.submit(work, *texts))
         finally:
             self._waiting -= 1
 
@@ -60,46 +74,6 @@ def _step_back() -> None:
     """Have the system serve the loop first; Linux alone has a niceness of threads."""
     if sys.platform == "linux":
         os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
-
-
-LEAST, MOST = 10, 256
-"""Characters of a password."""
-_KIB, _PASSES, _LANES = 19 * 1024, 2, 1
-"""OWASP Password Storage Cheat Sheet."""
-
-
-class Passwords:
-    """Hashes and checks passwords in a thread of its own; tests pass another."""
-
-    def __init__(self, thread: BoundedThread | None = None) -> None:
-        self._thread = thread or BoundedThread("passwords")
-        self._nobodys = ""
-
-    async def hashed(self, password: str) -> str:
-        """The hash to keep (PHC string format).
-
-        Raises:
-            BusyError: too many wait.
-        """
-        return await self._thread.run(_hash, password)
-
-    async def fits(self, password: str, kept: str) -> bool:
-        """Whether a password is the one whose hash is kept.
-
-        An empty hash takes the same time as a wrong password: nobody learns by it which
-        names exist.
-
-        Raises:
-            BusyError: too many wait.
-        """
-        if not self._nobodys:
-            self._nobodys = await self._thread.run(_hash, "")
-        fits = await self._thread.run(_fits, password, kept or self._nobodys)
-        return fits and bool(kept)
-
-    def close(self) -> None:
-        """End the thread."""
-        self._thread.close()
 
 
 def _hash(password: str) -> str:

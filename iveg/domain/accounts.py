@@ -14,7 +14,7 @@ from itertools import islice
 from typing import Final, Literal
 
 from iveg.domain.audit import Actor
-from iveg.domain.errors import NameTakenError
+from iveg.domain.errors import NameTakenError, SignOnError
 from iveg.domain.records import Json
 
 SignInMethod = Literal["link", "password", "sso", "token"]
@@ -151,6 +151,11 @@ class Session:
     wall: bool = False
 
     @property
+    def key(self) -> bytes:
+        """The digest, by which a session is found."""
+        return bytes.fromhex(self.digest)
+
+    @property
     def session_id(self) -> str:
         """Names it to people; tells nobody the digest, and lets nobody in."""
         return digest_of(f"id:{self.digest}")[:16]
@@ -198,7 +203,7 @@ class AccessBook:
     def __init__(self, kept: Access = NOBODY) -> None:
         self.accounts = {one.account_id: one for one in kept.accounts}
         self.tokens = {one.digest: one for one in kept.tokens}
-        self.sessions = {bytes.fromhex(one.digest): one for one in kept.sessions}
+        self.sessions = {one.key: one for one in kept.sessions}
         self.on_change: list[Callable[[AccessChange], None]] = []
         self.on_keep: list[Callable[[], None]] = []
 
@@ -260,7 +265,7 @@ class AccessBook:
         known = self.sessions
         if len(known) >= MOST_SESSIONS:
             del known[min(known, key=lambda one: known[one].seen)]
-        self.sessions[bytes.fromhex(session.digest)] = session
+        self.sessions[session.key] = session
         self.keep()
 
 
@@ -290,20 +295,6 @@ _MOST_VALUES: Final = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class ProvenIdentity:
-    """A person as the provider vouches for them.
-
-    Attributes:
-        person: Stable id of the account, made from issuer and subject.
-        role: The highest that the claims give; None: none.
-    """
-
-    person: str
-    name: str
-    role: PersonRole | None
-
-
-@dataclass(frozen=True, slots=True)
 class ClaimReading:
     """Where name and role stand in a provider's claims.
 
@@ -319,20 +310,26 @@ class ClaimReading:
     name_claim: str
     roles: Mapping[str, PersonRole]
 
-    def read(self, issuer: str, subject: str, claims: Json) -> ProvenIdentity:
-        """The person whom claims are about.
+    def read(self, issuer: str, subject: str, claims: Json) -> Account:
+        """The account of the person whom claims are about, with the highest role.
 
         Args:
-            issuer: Whose claims they are.
+            issuer: Makes the claims.
             subject: Id of the person there.
             claims: What is told; of it nothing but strings counts.
+
+        Raises:
+            SignOnError: the claims give no role.
         """
         person = person_id(issuer, subject)
         claimed = next(values_at(claims, self.name_claim), "")
         values = values_at(claims, self.role_claim)
         given = {self.roles[value] for value in values if value in self.roles}
         role = max(given, key=_RANKS.index, default=None)
-        return ProvenIdentity(person, name_of(claimed, person), role)
+        name = name_of(claimed, person)
+        if role is None:
+            raise SignOnError("no_role", f"no value of the claim gives one to {name}")
+        return Account(person, name, role, provider=issuer)
 
 
 def person_id(issuer: str, subject: str) -> str:

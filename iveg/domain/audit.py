@@ -1,62 +1,28 @@
-"""The audit: who did what."""
+"""Actors of the audit: the people, programs and parts whose acts it keeps."""
 
-import json
 from dataclasses import dataclass
-from typing import Final, Protocol
-
-from iveg.domain.records import AuditRecord, Json
-
-
-class Actor(Protocol):
-    """Whoever acts: a person, a program, or iVeg itself."""
-
-    @property
-    def person(self) -> str:
-        """Id of the account."""
-
-    @property
-    def name(self) -> str:
-        """Name at that moment."""
-
-    @property
-    def role(self) -> str:
-        """Role at that moment."""
-
-    @property
-    def method(self) -> str:
-        """Proof of the identity."""
+from typing import Final
 
 
 @dataclass(frozen=True, slots=True)
-class NamedActor:
-    """An actor of whom no request tells: iVeg itself, or a stranger."""
+class Actor:
+    """A person, a program, or iVeg itself, as known at the moment of an act.
 
-    person: str
+    Attributes:
+        name: For the record and the page; opaque to robots.
+        person: Id of the account; names may change and be given anew.
+        method: Proof of the identity.
+    """
+
     name: str
     role: str
-    method: str
+    person: str = ""
+    method: str = "none"
 
 
-ITSELF: Final = NamedActor("iveg", "iVeg", "system", "none")
+ITSELF: Final = Actor("iVeg", "system", "iveg")
 """Actor of acts that nobody asked for, such as retention."""
-STRANGER: Final = NamedActor("", "", "stranger", "none")
-"""Whoever tries to sign in."""
-CONSOLE: Final = NamedActor("console", "console", "system", "shell")
-"""Whoever calls ``iveg`` on the machine itself."""
-
-
-def act_of(
-    actor: Actor, action: str, subject: str, details: Json, *, audit_id: str, at: float
-) -> AuditRecord:
-    """Record of an act at a moment (Unix s)."""
-    return AuditRecord(
-        audit_id=audit_id,
-        at=at,
-        person=actor.person,
-        name=actor.name,
-        role=actor.role,
-        method=actor.method,
-        action=action,
-        subject=subject,
-        details=json.dumps(details, sort_keys=True, separators=(",", ":")),
-    )
+STRANGER: Final = Actor("", "stranger")
+"""Actor of a sign-in that was refused."""
+CONSOLE: Final = Actor("console", "system", "console", "shell")
+"""Actor of ``iveg`` on the machine itself."""

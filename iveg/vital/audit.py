@@ -1,12 +1,14 @@
-"""The one port by which the audit is written: an event in, a row on its way.
+"""The one port by which the audit is written: an act in, a row on its way.
 
 It never waits: rows go the way of the history, so that a STOP works where the disk is
 full or the database away, and the row that comes late says so.
 """
 
-from iveg.domain.audit import Actor, act_of
+import json
+
+from iveg.domain.audit import Actor
 from iveg.domain.observations import Instant
-from iveg.domain.records import Json
+from iveg.domain.records import AuditRecord, Json
 from iveg.vital.ports import Ids
 from iveg.vital.record import RecordSink
 
@@ -33,7 +35,18 @@ class AuditTrail:
         at: Instant,
     ) -> None:
         """Write one act down; returns at once."""
-        act = act_of(
-            actor, action, subject, details or {}, audit_id=self._new_id(), at=at.wall
+        self._sink.enqueue(
+            AuditRecord(
+                audit_id=self._new_id(),
+                at=at.wall,
+                person=actor.person,
+                name=actor.name,
+                role=actor.role,
+                method=actor.method,
+                action=action,
+                subject=subject,
+                details=json.dumps(
+                    details or {}, sort_keys=True, separators=(",", ":")
+                ),
+            )
         )
-        self._sink.enqueue(act)

@@ -99,7 +99,7 @@ def _add(routes: APIRouter, path: str, action: Action, *, everybodys: bool) -> N
         refuse_walls(who)
         for session, role in seen_by(request, who):
             if session.session_id == session_id:
-                authenticator_of(request).sessions.end([session])
+                authenticator_of(request).sessions.end(session.key)
                 return Json(_open_session(session, role, who))
         raise UnknownNameError("session", session_id)
 
@@ -107,13 +107,14 @@ def _add(routes: APIRouter, path: str, action: Action, *, everybodys: bool) -> N
     async def end_others(request: Request, who: visitor) -> Response:
         """End all but the one that asks, STOP included."""
         refuse_walls(who)
-        others = [one for one, _ in seen_by(request, who) if not _is_own(one, who)]
-        authenticator_of(request).sessions.end(others)
+        seen = seen_by(request, who)
+        others = [one.key for one, _ in seen if not _is_own(one, who)]
+        authenticator_of(request).sessions.end(*others)
         return Json(SessionsEnded(ended=len(others)))
 
 
 def _is_own(session: Session, who: Principal) -> bool:
-    return who.session is not None and session.digest == who.session.hex()
+    return session.key == who.session
 
 
 def _open_session(session: Session, role: Role, who: Principal) -> OpenSession:

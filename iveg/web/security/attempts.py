@@ -78,7 +78,7 @@ class Attempts:
         """
         self.refuse_waiting(request)
         self.count(request)
-        self.note_refused(STRANGER, request)
+        self.note_refused(request)
         self.refused += 1
         if self._lines.admit(self._clock().mono):
             _log.warning("sign-in refused: %s (%d so far)", wrong, self.refused)
@@ -106,11 +106,11 @@ class Attempts:
         details = {"address": client_of(request), **facts}
         self._trail.note(actor, action, details=details, at=self._clock())
 
-    def note_refused(self, actor: Actor, request: Request, **facts: str) -> bool:
+    def note_refused(self, request: Request, **facts: str) -> bool:
         """Write a refused sign-in into the audit; False: there were too many."""
         is_kept = self._rows.admit(self._clock().mono)
         if is_kept:
-            self.note(actor, "sign_in_refused", request, **facts)
+            self.note(STRANGER, "sign_in_refused", request, **facts)
         return is_kept
 
 

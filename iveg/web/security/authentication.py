@@ -178,8 +178,8 @@ class Authenticator:
     def _end_before(self, request: Request) -> None:
         """End the session that this browser has."""
         before = self.identify(request)
-        if before is not None:
-            self.sessions.revoke(before)
+        if before is not None and before.session is not None:
+            self.sessions.end(before.session)
 
     # --- identification ---------------------------------------------------------
 

@@ -140,6 +140,4 @@ class People:
 
 
 def _principal(token: ApiToken) -> Principal:
-    return Principal(
-        token.name, _ROLES[token.scope], person=token.token_id, method="token"
-    )
+    return Principal(token.name, _ROLES[token.scope], token.token_id, "token")

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from iveg.domain.accounts import OF_ACCOUNTS, SignInMethod
+from iveg.domain.audit import Actor
 
 Role = Literal[
     "viewer", "operator", "admin", "reader", "program", "controller", "expired"
@@ -24,23 +25,18 @@ MAY: Final[Mapping[Role, frozenset[Action]]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Principal:
+class Principal(Actor):
     """An authenticated person or program.
 
     Attributes:
-        name: For the record and the page; opaque to robots.
         session: Digest of the session that lets them in; None for programs.
-        person: Id of the account; names may change and be given anew.
-        method: How they proved who they are.
         signed_in_at: When (Unix s); None for programs, which do so at each request.
         wall: The session was left to a screen that everybody passes.
     """
 
-    name: str
     role: Role
-    session: bytes | None = None
-    person: str = ""
     method: SignInMethod = "link"
+    session: bytes | None = None
     signed_in_at: float | None = None
     wall: bool = False
 
@@ -54,8 +50,8 @@ class Principal:
         return action in MAY[self.role]
 
 
-NOBODY = Principal("nobody", "expired")
+NOBODY: Final = Principal("nobody", "expired")
 """Unknown caller of an open route; never passed to a route that requires a role."""
 
-PROGRAM = Principal("program", "program", person="program", method="token")
-"""Whoever sends the one bearer token of the environment."""
+PROGRAM: Final = Principal("program", "program", "program", "token")
+"""Any program with the one bearer token of the environment."""

@@ -10,7 +10,6 @@ goes on counting while iVeg is down::
 
 import hashlib
 import secrets
-from collections.abc import Collection
 from dataclasses import replace
 from typing import cast
 
@@ -102,12 +101,6 @@ class Sessions:
             return principal
         return self._principal(principal.session, touch=False)
 
-    def revoke(self, principal: Principal) -> None:
-        """End a session at once, STOP included."""
-        if principal.session is not None:
-            self._sessions.pop(principal.session, None)
-            self._keep()
-
     def standing(self) -> list[tuple[Session, Role]]:
         """Those that are not over, each with the role that is left of it."""
         found = []
@@ -117,10 +110,10 @@ class Sessions:
                 found.append((self._sessions[digest], who.role))
         return found
 
-    def end(self, ended: Collection[Session]) -> None:
-        """End some at once, STOP included."""
-        for session in ended:
-            self._sessions.pop(bytes.fromhex(session.digest), None)
+    def end(self, *ended: bytes) -> None:
+        """End those of these digests at once, STOP included."""
+        for digest in ended:
+            self._sessions.pop(digest, None)
         self._keep()
 
     def lower(self, principal: Principal) -> None:
@@ -148,9 +141,9 @@ class Sessions:
         return Principal(
             session.name,
             role,
-            digest,
             session.person,
             session.method,
+            digest,
             session.began,
             session.wall,
         )

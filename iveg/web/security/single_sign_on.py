@@ -24,8 +24,8 @@ from iveg.adapters.identity_provider import (
     IdentityProvider,
     SealedAttempts,
 )
-from iveg.domain.accounts import Account, ClaimReading, ProvenIdentity
-from iveg.domain.audit import STRANGER, Actor, NamedActor
+from iveg.domain.accounts import Account, ClaimReading
+from iveg.domain.audit import Actor
 from iveg.domain.errors import HopError, SignOnError
 from iveg.domain.wire import clean_text
 from iveg.web.security.authentication import Authenticator
@@ -56,7 +56,6 @@ class SingleSignOn:
     ) -> None:
         self._provider, self._reading = provider, reading
         self._authenticator, self._lasts_s = authenticator, lasts_s
-        self._issuer = provider.client.issuer
         self._clock = authenticator.people.clock
         self._attempts = SealedAttempts()
         self._exchanges = asyncio.Semaphore(_MOST_TOGETHER)
@@ -77,8 +76,7 @@ class SingleSignOn:
             async with self._asking():
                 address = await self._provider.address(attempt)
         except SignOnError as error:
-            who = self._authenticator.identify(request)
-            self._note_refused(request, error, who or STRANGER)
+            self._note_refused(request, error)
             raise
         response = RedirectResponse(address, 303)
         # Lax: the way back begins at the provider, where Strict cookies stay behind.
@@ -102,18 +100,16 @@ class SingleSignOn:
         Raises:
             SignOnError: it lets nobody in; the audit has it.
         """
-        who: Actor = STRANGER
         try:
             attempt = self._attempt(request)
             code = _code(request)
             async with self._asking():
                 vouched = await self._provider.vouch(attempt, code)
-            proven = self._reading.read(self._issuer, vouched.subject, vouched.claims)
-            role = proven.role or "stranger"
-            who = NamedActor(proven.person, proven.name, role, "sso")
-            return self._open(proven, who), attempt.to
+            issuer = self._provider.client.issuer
+            told = self._reading.read(issuer, vouched.subject, vouched.claims)
+            return self._open(told), attempt.to
         except SignOnError as error:
-            self._note_refused(request, error, who)
+            self._note_refused(request, error)
             raise
 
     def _attempt(self, request: Request) -> Attempt:
@@ -125,13 +121,10 @@ class SingleSignOn:
             raise SignOnError("outdated", "no sign-in of this browser waits for it")
         return attempt
 
-    def _open(self, proven: ProvenIdentity, by: Actor) -> str:
+    def _open(self, told: Account) -> str:
         """Begin the session of a person who was vouched for; returns its token."""
-        if proven.role is None:
-            raise SignOnError("no_role", "none of the claim's values gives one")
-        account = self._authenticator.people.admission(by).vouched(
-            Account(proven.person, proven.name, proven.role, provider=self._issuer)
-        )
+        by = Actor(told.name, told.role, told.account_id, "sso")
+        account = self._authenticator.people.admission(by).vouched(told)
         until = self._clock().wall + self._lasts_s
         return self._authenticator.sessions.open(
             account.name, account.role, account.account_id, "sso", until
@@ -150,9 +143,9 @@ class SingleSignOn:
         except HopError as error:
             raise SignOnError("unreachable", error.detail) from error
 
-    def _note_refused(self, request: Request, error: SignOnError, who: Actor) -> None:
+    def _note_refused(self, request: Request, error: SignOnError) -> None:
         facts = {"by": "sso", "why": error.failure, "detail": error.detail}
-        if self._authenticator.attempts.note_refused(who, request, **facts):
+        if self._authenticator.attempts.note_refused(request, **facts):
             _log.warning("sign-in by the provider refused: %s", error)
 
 

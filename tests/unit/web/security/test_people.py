@@ -5,17 +5,16 @@ import threading
 from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 from functools import partial
-from typing import ParamSpec, TypeVar
+from typing import TypeVar
 
 import httpx
 import pytest
 
-from iveg.adapters.passwords import BoundedThread, Passwords
+from iveg.adapters.passwords import Passwords
 from iveg.domain.accounts import Account, digest_of
 from iveg.web.pages.routes import router
 from tests.unit.web.desk import HOST, WebDesk
 
-P = ParamSpec("P")
 T = TypeVar("T")
 OWN = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
 ANA = Account("P1", "Ana Núñez", "operator", password="#acelga-1234")
@@ -75,58 +74,57 @@ async def test_a_wrong_name_and_a_wrong_password_are_told_alike(
     assert len(desk.passwords.asked) == 2
 
 
-class HeldThread(BoundedThread):
-    """A real one; ``computed`` says what, on which thread.  ``gate`` holds it up."""
+class HeldPasswords(Passwords):
+    """Real ones; ``computed`` says what, on which thread.  ``gate`` holds it up."""
 
     def __init__(self) -> None:
-        super().__init__("passwords")
+        super().__init__()
         self.computed: list[tuple[str, str]] = []
         self.gate = threading.Event()
         self.gate.set()
 
-    async def run(self, work: Callable[P, T], *args: P.args, **named: P.kwargs) -> T:
-        return await super().run(partial(self._held, work), *args, **named)
+    async def _run(self, work: Callable[..., T], *texts: str) -> T:
+        return await super()._run(partial(self._held, work), *texts)
 
-    def _held(self, work: Callable[P, T], *args: P.args, **named: P.kwargs) -> T:
+    def _held(self, work: Callable[..., T], *texts: str) -> T:
         self.computed.append((work.__name__, threading.current_thread().name))
         assert self.gate.wait(30)
-        return work(*args, **named)
+        return work(*texts)
 
 
 @pytest.fixture
-async def held() -> AsyncIterator[tuple[PeoplesDesk, Passwords, HeldThread]]:
-    thread = HeldThread()
-    passwords = Passwords(thread)
+async def held() -> AsyncIterator[tuple[PeoplesDesk, HeldPasswords]]:
+    passwords = HeldPasswords()
     desk = PeoplesDesk()
     desk.people._passwords = passwords
-    yield desk, passwords, thread
+    yield desk, passwords
     desk.people.close()
 
 
 @pytest.mark.parametrize("name", ["Ana Núñez", "Eva", "Out", "nobody", "", "x" * 64])
 async def test_whoever_is_not_let_in_is_computed_as_often_and_by_the_same_path(
-    held: tuple[PeoplesDesk, Passwords, HeldThread], name: str
+    held: tuple[PeoplesDesk, HeldPasswords], name: str
 ) -> None:
-    desk, passwords, thread = held
+    desk, passwords = held
     desk.book.accounts["P1"] = replace(ANA, password=await passwords.hashed("right-1"))
     desk.book.accounts["P3"] = Account("P3", "Out", "viewer", disabled=True)
-    thread.computed.clear()
+    passwords.computed.clear()
 
     async with desk.page() as page:
         statuses = [await enter(page, name=name, password="wrong-1") for _ in range(2)]
 
     assert statuses == [401, 401]
     # The hash that stands for nobody's is made once, whoever comes first.
-    assert [work for work, _ in thread.computed] == ["_hash", "_fits", "_fits"]
+    assert [work for work, _ in passwords.computed] == ["_hash", "_fits", "_fits"]
 
 
 async def test_a_flood_of_sign_ins_waits_in_a_short_line_beside_the_loop(
-    held: tuple[PeoplesDesk, Passwords, HeldThread],
+    held: tuple[PeoplesDesk, HeldPasswords],
 ) -> None:
-    desk, passwords, thread = held
+    desk, passwords = held
     await passwords.fits("", "")
-    thread.computed.clear()
-    thread.gate.clear()
+    passwords.computed.clear()
+    passwords.gate.clear()
 
     async def flood(number: int) -> int:
         address = f"10.0.{number // 250}.{number % 250}"
@@ -141,15 +139,15 @@ async def test_a_flood_of_sign_ins_waits_in_a_short_line_beside_the_loop(
         await asyncio.wait(guesses[16:])
     async with desk.browser("viewer") as page:
         stop = await page.post("/api/v1/robots/AGI/stop")
-    computed_until_then = len(thread.computed)
-    thread.gate.set()
+    computed_until_then = len(passwords.computed)
+    passwords.gate.set()
 
     assert stop.status_code == 202
     assert [robot for robot, _ in desk.fleet.stops] == ["AGI"]
     # One is at work, fifteen wait; the others were refused before any computing.
     assert computed_until_then == 1
     assert sorted(await asyncio.gather(*guesses)) == [401] * 16 + [429] * 284
-    assert {thread for _, thread in thread.computed} == {"passwords_0"}
+    assert {thread for _, thread in passwords.computed} == {"passwords_0"}
 
 
 async def test_sign_ins_beyond_twenty_a_second_are_looked_at_by_nobody(

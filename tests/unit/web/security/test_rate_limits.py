@@ -77,7 +77,7 @@ class Bench:
         name = connection.headers["cookie"]
         if name == "program":
             return Principal(name, "program")
-        return Principal(name, "viewer", name.encode())
+        return Principal(name, "viewer", session=name.encode())
 
     async def open(self, who: str = "ana") -> Browser:
         browser = Browser()

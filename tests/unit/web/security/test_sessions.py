@@ -62,7 +62,7 @@ def test_who_signed_out_is_not_back_after_a_restart(start: Restart) -> None:
     who = sessions.find(token)
     assert who is not None
 
-    sessions.revoke(who)
+    sessions.end(who.session or b"")
 
     assert start().find(token) is None
 

@@ -150,7 +150,7 @@ async def test_who_has_no_mapped_role_is_told_so_and_is_not_in(
     assert said[language] in refused.text
     assert "Cooperativa" in refused.text
     ((action, method, details),) = desk.acts()
-    assert (action, method) == ("sign_in_refused", "sso")
+    assert (action, method) == ("sign_in_refused", "none")
     assert '"why":"no_role"' in details
     assert desk.book.accounts == {"P1": LOCAL}
 
