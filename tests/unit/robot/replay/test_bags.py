@@ -115,7 +115,7 @@ def box_3d() -> Any:
     ],
     ids=lambda one: one.ROS,
 )
-def test_a_detector_of_each_family_with_depth_sees_the_person_where_it_is(
+def test_a_detector_of_each_family_sees_the_person_where_it_is(
     message: Message, tmp_path: Path
 ) -> None:
     seen = ("/detector", message, WALL + 0.1)

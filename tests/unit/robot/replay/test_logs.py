@@ -217,7 +217,7 @@ def test_of_several_robots_one_is_named(path: Path) -> None:
     with pytest.raises(DataFileError, match=r"holds AGI, AGII: name one"):
         entries(path)
     (only,) = entries(path.with_name(path.name + "#AGII"))
-    assert only.observation.robot_id == "AGII"  # type: ignore[union-attr]
+    assert only.observation.robot_id == "AGII"
     with pytest.raises(DataFileError, match="no odometry"):
         entries(path.with_name(path.name + "#D1"))
 
