@@ -2,7 +2,6 @@
 
 import asyncio
 import logging
-import re
 from pathlib import Path
 
 import pytest
@@ -19,11 +18,7 @@ from iveg.domain.observations import (
 from iveg.ngsi import codec
 from iveg.robot.node import NodeSettings
 from iveg.robot.replay.replay import ReplaySettings, run_replay
-from iveg.ros2 import detector_messages as d
-from iveg.ros2 import messages as ros
-from tests import data, processes
-from tests.data.message_bags import Said as MessageSaid
-from tests.data.message_bags import message_bag
+from tests import data
 from tests.integration.emulator_cloud import Cloud, running, until
 from tests.processes import Site
 
@@ -120,35 +115,6 @@ async def test_what_cannot_be_played_is_refused_with_one_sentence(
     nobody = of_run(BrokerAddress("127.0.0.1", 1), tmp_path, 1.0)
     with pytest.raises(DataFileError, match=why):
         await run_replay(files, robots, nobody)
-
-
-def detected(stamp: float) -> d.BoundingBoxes3d:
-    """A person 3 m before the robot, in its own frame, as YOLACT tells it."""
-    header = ros.Header(ros.Time.of(stamp), "base_link")
-    box = d.BoundingBox3d("farmer", 0.9, 2.8, -0.3, 3.2, 0.3, 0.0, 1.8)
-    return d.BoundingBoxes3d(header, (box,))
-
-
-def yolact_bag(path: Path) -> Path:
-    """A robot that stands at (2, 1) for two seconds and sees a person."""
-    said: list[MessageSaid] = []
-    for tick in range(20):
-        at = 1000.0 + tick / 10
-        place = ros.PoseWithCovariance(ros.Pose(ros.Point(2.0, 1.0)))
-        header = ros.Header(ros.Time.of(at), "odom")
-        said.append(("/odom", ros.Odometry(header, "base_link", place), at))
-        said.append(("/yolact_coordinate", detected(at), at))
-    return message_bag(path, said)
-
-
-def test_the_command_tells_of_each_topic_what_becomes_of_it(place: Site) -> None:
-    bag = yolact_bag(place.directory / "run")
-
-    place.settings["IVEG_ROBOTS"] = "D1:recording"
-    replaying = place.start("replay", str(bag), "--robot", "D1", "--force")
-
-    row = re.compile(r"^/yolact_coordinate +gb_\S+ +20 +detections$", re.MULTILINE)
-    processes.until(lambda: row.search(replaying.text()), "the table")
 
 
 def test_a_broken_bag_ends_the_command_with_one_sentence_and_status_two(
