@@ -1,18 +1,15 @@
 """Commands and their arguments (docs/interfaces/cli.md)."""
 
 import argparse
-import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from iveg import __version__
 from iveg.domain.fleet import is_robot_id
-from iveg.domain.geometry import Pose2D
 from iveg.domain.records import LISTS
 from iveg.settings import Settings
 
-_FARTHEST_M = 1e6
 AddArguments = Callable[[argparse.ArgumentParser], None]
 
 
@@ -128,22 +125,8 @@ def add_replay(replay: argparse.ArgumentParser) -> None:
     )
     replay.add_argument("--speed", type=_speed, default=1.0, metavar="FACTOR")
     replay.add_argument("--loop", action="store_true", help="start over at the end")
-    for what in ("odom", "scan", "detections", "depth", "camera-info"):
+    for what in ("odom", "scan", "detections"):
         replay.add_argument(f"--{what}-topic", metavar="TOPIC", help="of a ROS bag")
-    replay.add_argument(
-        "--bag-time",
-        action="store_true",
-        help="a ROS bag plays by when it was recorded, not by its stamps",
-    )
-    replay.add_argument(
-        "--pose",
-        type=_pose,
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="ROBOT:X,Y,YAW",
-        help="where a recording without odometry stands (m, m, rad)",
-    )
     replay.add_argument(
         "--frame",
         type=_frame,
@@ -198,17 +181,6 @@ def add_end(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--until-eof", action="store_true", help="end when the input closes"
     )
-
-
-def _pose(text: str) -> tuple[str, Pose2D]:
-    robot_id, _, place = text.partition(":")
-    try:
-        x, y, yaw = (float(part) for part in place.split(","))
-    except ValueError:
-        x = y = yaw = math.nan
-    if not all(abs(one) <= _FARTHEST_M for one in (x, y, yaw)):
-        raise argparse.ArgumentTypeError("ROBOT:X,Y,YAW in m, m, rad")
-    return robot_id, Pose2D(x, y, yaw)
 
 
 def _frame(text: str) -> str:

@@ -14,7 +14,6 @@ from iveg.cli.nodes import broker_of, node_settings
 from iveg.cli.running import LOOPBACK, run_until_stopped
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription
-from iveg.robot.replay.bags import BagOptions
 from iveg.robot.replay.replay import ReplaySettings, run_replay
 from iveg.settings import Settings
 
@@ -57,15 +56,11 @@ async def replay(options: argparse.Namespace, settings: Settings) -> None:
                 options.frame,
             ),
             fleet=fleet,
-            bag=BagOptions(
-                options.odom_topic,
-                options.scan_topic,
-                options.bag_time,
-                options.detections_topic,
-                options.depth_topic,
-                options.camera_info_topic,
-            ),
-            poses=dict(options.pose),
+            named={
+                "odometry": options.odom_topic,
+                "scan": options.scan_topic,
+                "detections": options.detections_topic,
+            },
             tell=partial(print, flush=True),
         )
 
@@ -74,9 +69,6 @@ async def _refuse_replay(
     options: argparse.Namespace, settings: Settings, fleet: FleetDescription
 ) -> None:
     """Refuse a replay that could be taken for a live robot."""
-    for name, _ in options.pose:
-        if name not in options.robot:
-            raise DataFileError("--pose", name, "is none of the robots to be played")
     for name in options.robot:
         if name not in fleet.members:
             known = ", ".join(fleet.ids)

@@ -44,26 +44,31 @@ from iveg.ngsi.codec.incoming import ranges_of
 
 # --- logs -------------------------------------------------------------------------
 #
-# Recorded runs as files: JSON lines, plain or gzipped (docs/interfaces/replay.md).
+# JSON lines, plain or gzipped (docs/interfaces/replay.md).
 #
 # A file is read line by line and never held in memory.  A line that cannot be used is
 # reported once with file and line number and skipped; a file that cannot be used at all
 # stops the start with one sentence.
 
 _log = logging.getLogger(__name__)
-_LONGEST_LINE = 1 << 20
+_ONE_PICTURE_S = 0.02
+"""Detections within this time (s) are one frame; frames come 30 times a second."""
+_SEEN_FOR_S = 0.4
+"""Time (s of the recording) that detections count, unless others follow."""
+_Timed = tuple[float, Odometry | LaserScan | Detection]
+"""Seconds from the start, and what a line tells."""
 
 
 @dataclass(frozen=True, slots=True)
 class RecordingEntry:
-    """One line of a log, or one message of a bag.
+    """One observation of a recording.
 
     Attributes:
         at: Seconds from the start of the recording.
     """
 
     at: float
-    observation: Odometry | LaserScan | Detection | DetectionFrame
+    observation: Odometry | LaserScan | DetectionFrame
 
 
 class LogReader:
@@ -83,19 +88,33 @@ class LogReader:
     def entries(self) -> Iterator[RecordingEntry]:
         """All entries from the start, in the order of the file.
 
+        A log has no empty frames: behind the first detection, odometry without one
+        beside it stands for one.
+
         Raises:
             DataFileError: the compressed file is truncated, or was removed.
         """
+        seen: tuple[Detection, ...] = ()
+        seen_at: float | None = None
+        for at, observation in self._lines():
+            if isinstance(observation, Detection):
+                is_same_picture = seen_at is not None and at - seen_at <= _ONE_PICTURE_S
+                seen = (*seen, observation) if is_same_picture else (observation,)
+                seen_at = at
+                yield RecordingEntry(at, DetectionFrame("", Origin(), seen))
+                continue
+            yield RecordingEntry(at, observation)
+            is_odometry = isinstance(observation, Odometry)
+            if is_odometry and seen_at is not None and at - seen_at >= _SEEN_FOR_S:
+                yield RecordingEntry(at, DetectionFrame("", Origin(), ()))
+
+    def _lines(self) -> Iterator[_Timed]:
         try:
             with self._open() as lines:
-                number = 0
-                while line := lines.readline(_LONGEST_LINE):
-                    number += 1
-                    entry = self._entry(number, line)
-                    while len(line) == _LONGEST_LINE and not line.endswith(b"\n"):
-                        line = lines.readline(_LONGEST_LINE)
-                    if entry is not None:
-                        yield entry
+                for number, line in enumerate(lines, 1):
+                    timed = self._read(number, line)
+                    if timed is not None:
+                        yield timed
         except (OSError, EOFError, zlib.error) as error:
             reason = f"cannot be read: {error}."
             raise DataFileError(str(self._file), "", reason) from error
@@ -105,7 +124,7 @@ class LogReader:
             return gzip.open(self._file, "rb")
         return self._file.open("rb")
 
-    def _entry(self, number: int, line: bytes) -> RecordingEntry | None:
+    def _read(self, number: int, line: bytes) -> _Timed | None:
         if not line.strip():
             return None
         try:
@@ -182,11 +201,9 @@ _LINE: TypeAdapter[_OdometryLine | _ScanLine | _DetectionLine] = TypeAdapter(
 )
 
 
-def _read(line: bytes) -> RecordingEntry:
-    if len(line) >= _LONGEST_LINE:
-        raise UnreadableError("too_long", f"more than {_LONGEST_LINE} bytes")
+def _read(line: bytes) -> _Timed:
     value = _LINE.validate_python(load_json(line))
-    return RecordingEntry(value.t, value.observation())
+    return value.t, value.observation()
 
 
 # --- own --------------------------------------------------------------------------

@@ -9,9 +9,8 @@ and detections are repeated, as the sensors of a robot at rest do.
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 from iveg.adapters import clock
@@ -19,7 +18,6 @@ from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import NOBODY, FleetDescription, RobotProfile
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.observations import (
-    Detection,
     DetectionFrame,
     LaserScan,
     Navigation,
@@ -27,7 +25,7 @@ from iveg.domain.observations import (
     Origin,
 )
 from iveg.robot.node import NodeSettings, RobotNode, every
-from iveg.robot.replay.bags import AS_RECORDED, Bag, BagOptions
+from iveg.robot.replay.bags import Bag, NamedTopics
 from iveg.robot.replay.logs import LogReader, OwnRecording, RecordingEntry, is_own
 
 # --- playback ---------------------------------------------------------------------
@@ -37,12 +35,8 @@ from iveg.robot.replay.logs import LogReader, OwnRecording, RecordingEntry, is_o
 _READ_AHEAD = 256
 """Entries searched for the next pose; beyond, the last pose is kept."""
 
-_SEEN_FOR_S = 0.4
-"""Time (s of the recording) that detections count, unless others follow."""
 _SILENT_S = 1.0
-"""Time that a whole frame counts (s): a detector without one since is silent."""
-_ONE_PICTURE_S = 0.02
-"""Detections within this time (s) are one frame; frames come 30 times a second."""
+"""Time that a frame counts (s): a detector without one since is silent."""
 
 
 class Playback:
@@ -54,11 +48,8 @@ class Playback:
 
     Attributes:
         ended: Whether the last entry was played; never with ``loop``.
-        has_detector: Whether a detection was read: then none means an empty frame; of
-            whole frames, empty ones too, whether one is at most a second old.
         scan: The newest scan; the same object until the next.
-        detections: Of the newest frame; none when it is too old.
-        unread: Class of each box of the newest frame that has no place.
+        frame: The newest detection frame; None while the detector is silent.
     """
 
     def __init__(
@@ -67,16 +58,13 @@ class Playback:
         self._open = open_
         self._loop = loop
         self.ended = False
-        self.has_detector = self._is_frame = False
         self._start_over()
 
     def _start_over(self) -> None:
         self._source = self._open()
         self._ahead: deque[RecordingEntry] = deque()
         self._poses_ahead: deque[tuple[float, Odometry]] = deque()
-        self.detections: tuple[Detection, ...] = ()
-        self.unread: tuple[str | None, ...] = ()
-        self.has_detector = self.has_detector and not self._is_frame
+        self.frame: DetectionFrame | None = None
         self._seen_at = 0.0
         self.scan: LaserScan | None = None
         self._read_ahead()
@@ -92,10 +80,8 @@ class Playback:
         while self._ahead and self._ahead[0].at <= self._at:
             self._apply(self._ahead.popleft())
             self._read_ahead()
-        age = self._at - self._seen_at
-        if age >= (_SILENT_S if self._is_frame else _SEEN_FOR_S):
-            self.detections, self.unread = (), ()
-            self.has_detector = self.has_detector and not self._is_frame
+        if self._at - self._seen_at >= _SILENT_S:
+            self.frame = None
         if not self._ahead and self._loop:
             self._start_over()
         self.ended = not self._ahead and not self._loop
@@ -115,18 +101,8 @@ class Playback:
                 self._last = self._poses_ahead.popleft()
             case LaserScan() as scan:
                 self.scan = scan
-            case Detection() as detection:
-                self.has_detector = True
-                self._see(detection, entry.at)
-            case DetectionFrame(detections=seen, unread=unread):
-                self.has_detector = self._is_frame = True
-                self.detections, self.unread, self._seen_at = seen, unread, entry.at
-
-    def _see(self, detection: Detection, at: float) -> None:
-        """The newest frame replaces the one before: a walking person counts once."""
-        if not self.detections or abs(at - self._seen_at) > _ONE_PICTURE_S:
-            self.detections, self._seen_at = (), at
-        self.detections = (*self.detections, detection)
+            case DetectionFrame() as frame:
+                self.frame, self._seen_at = frame, entry.at
 
     # --- sensor values at this moment ---------------------------------------------
 
@@ -151,6 +127,8 @@ class Playback:
 #
 # Recordings of any format as entries in time: logs of JSON lines, ROS bags, iVeg's.
 
+AS_RECORDED: NamedTopics = {}
+"""The only topic of each type."""
 _LOGS, _BAGS = (".jsonl", ".gz"), (".db3", ".mcap")
 
 
@@ -162,9 +140,7 @@ It raises DataFileError when the recording is truncated."""
 def open_recording(
     path: Path,
     mount: Pose2D,
-    bag: BagOptions = AS_RECORDED,
-    *,
-    pose: Pose2D | None = None,
+    named: NamedTopics = AS_RECORDED,
     tell: Callable[[str], None] | None = None,
 ) -> Recording:
     """Open a recording by its file name.
@@ -173,62 +149,42 @@ def open_recording(
         path: ``.jsonl``, ``.jsonl.gz``, ``.db3``, ``.mcap``, or a directory;
             of iVeg's own recordings also ``FILE.mcap#ROBOT``.
         mount: Pose of a bag's laser in ``base_link``; logs contain it.
-        bag: Topics and clock of a bag.
-        pose: Fixed pose of a recording without odometry, such as a camera's.
+        named: Topics of a bag that are named.
         tell: Takes a line for each topic of a bag: what becomes of it.
 
     Raises:
-        DataFileError: unknown format, unreadable file, or neither odometry nor a fixed
-            pose.
+        DataFileError: unknown format, unreadable file, or no odometry.
     """
-    recording, table = _opened(path, mount, bag, fixed=pose is not None)
+    recording, table = _opened(path, mount, named)
     if tell is not None:
         for line in table:
             tell(line)
-    if any(isinstance(one.observation, Odometry) for one in recording()):
-        return recording
-    if pose is None:
-        reason = "holds no odometry that can be used; --pose says where it stands."
-        raise DataFileError(str(path), "", reason)
-    if next(recording(), None) is None:
-        raise DataFileError(str(path), "", "holds nothing that can be used.")
-    return partial(_fixed, recording, pose)
+    if not any(isinstance(one.observation, Odometry) for one in recording()):
+        raise DataFileError(str(path), "", "holds no odometry that can be used.")
+    return recording
 
 
 def _opened(
-    path: Path,
-    mount: Pose2D,
-    bag: BagOptions,
-    *,
-    fixed: bool,
-) -> tuple[Recording, list[str]]:
+    path: Path, mount: Pose2D, named: NamedTopics
+) -> tuple[Recording, Sequence[str]]:
     """The recording, and the table of a bag's topics."""
     stem, _, robot_id = str(path).partition(".mcap#")
     own = Path(f"{stem}.mcap") if robot_id else path
     if own.suffix == ".mcap" and is_own(own):
-        return OwnRecording(own, robot_id or None).entries, []
+        return OwnRecording(own, robot_id or None).entries, ()
     if robot_id and own.is_file():
         reason = (
             "is no recording of iVeg's that can be read, so # names no robot in it."
         )
         raise DataFileError(str(own), "", reason)
     if path.is_dir() or path.suffix in _BAGS:
-        opened = Bag(path, bag, mount, needs_odometry=not fixed)
-        return opened.entries, [f"{path}:", *opened.plan.table()]
+        opened = Bag(path, named, mount)
+        return opened.entries, (f"{path}:", *opened.plan.table())
     if path.suffix in _LOGS:
-        return LogReader(path).entries, []
+        return LogReader(path).entries, ()
     known = ", ".join((*_LOGS[:1], ".jsonl.gz", *_BAGS))
     reason = f"is none of {known}, and no directory of a bag."
     raise DataFileError(str(path), "", reason)
-
-
-def _fixed(recording: Recording, pose: Pose2D) -> Iterator[RecordingEntry]:
-    """Entries of a static sensor: its pose precedes all others."""
-    entries = recording()
-    first = next(entries)
-    yield RecordingEntry(first.at, Odometry("", Origin(), pose, REST))
-    yield first
-    yield from entries
 
 
 # --- replay -----------------------------------------------------------------------
@@ -242,7 +198,6 @@ _LOOK_EVERY_S = 0.2
 _NAVIGATION_EVERY_S = 1.0
 _LONGEST_STEP_S = 0.2
 _STANDS_AT_END_S = 2.0
-_FASTEST = 100.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,9 +222,8 @@ async def run_replay(
     robots: Sequence[str],
     settings: ReplaySettings,
     *,
-    bag: BagOptions = AS_RECORDED,
-    fleet: FleetDescription | None = None,
-    poses: Mapping[str, Pose2D] | None = None,
+    named: NamedTopics = AS_RECORDED,
+    fleet: FleetDescription = NOBODY,
     tell: Callable[[str], None] | None = None,
 ) -> None:
     """Play recordings; returns when all have ended, never with ``loop``.
@@ -279,26 +233,20 @@ async def run_replay(
         robots: Their ids, in the order of the files.
         settings: Those of all robots; the directory of the hold files is made if
             missing.
-        bag: Topics and clock of a ROS bag.
-        fleet: Fleet description; None: no description.
-        poses: By robot, the fixed pose of a recording without odometry.
+        named: Topics of ROS bags that are named.
+        fleet: Fleet description.
         tell: Takes a line for each topic of a bag: what becomes of it.
 
     Raises:
         DataFileError: files and robots do not match, or a file cannot be used.
     """
-    _check(files, robots, settings.speed)
-    known, stands = fleet or NOBODY, poses or {}
-    profiles = [known.of_robot(robot_id).profile for robot_id in robots]
-    recordings = [
-        open_recording(file, profile.laser, bag, pose=stands.get(robot_id), tell=tell)
-        for file, robot_id, profile in zip(files, robots, profiles, strict=True)
-    ]
-    playbacks = [Playback(one, loop=settings.loop) for one in recordings]
-    replayed = [
-        ReplayedRobot(robot_id, profile, playback, settings)
-        for robot_id, profile, playback in zip(robots, profiles, playbacks, strict=True)
-    ]
+    _check(files, robots)
+    replayed = []
+    for file, robot_id in zip(files, robots, strict=True):
+        profile = fleet.of_robot(robot_id).profile
+        recording = open_recording(file, profile.laser, named, tell)
+        playback = Playback(recording, loop=settings.loop)
+        replayed.append(ReplayedRobot(robot_id, profile, playback, settings))
     try:
         await _play(replayed)
     except BaseExceptionGroup as group:
@@ -320,15 +268,12 @@ async def _play(replayed: "Sequence[ReplayedRobot]") -> None:
             task.cancel()
 
 
-def _check(files: Sequence[Path], robots: Sequence[str], speed: float) -> None:
+def _check(files: Sequence[Path], robots: Sequence[str]) -> None:
     if len(files) != len(robots) or not files:
         reason = f"{len(files)} files for {len(robots)} robots: each robot needs one."
         raise DataFileError("replay", "", reason)
     if len(set(robots)) != len(robots):
         raise DataFileError("replay", "", "a robot is named twice.")
-    if not 0.0 < speed <= _FASTEST:
-        reason = f"speed must be more than 0 and at most {_FASTEST:g}, not {speed:g}."
-        raise DataFileError("replay", "", reason)
 
 
 def _first_of_files(group: BaseExceptionGroup[BaseException]) -> DataFileError | None:
@@ -413,9 +358,9 @@ class ReplayedRobot:
         if scan and (is_new or self._is_due(LaserScan, _SCAN_AGAIN_S, now)):
             self._sent_scan, self._sent_at[LaserScan] = scan, now
             self._node.sense(scan)
-        looks = self._playback.has_detector
-        if looks and self._is_due(DetectionFrame, _LOOK_EVERY_S, now):
-            seen, unread = self._playback.detections, self._playback.unread
+        frame = self._playback.frame
+        if frame is not None and self._is_due(DetectionFrame, _LOOK_EVERY_S, now):
+            seen, unread = frame.detections, frame.unread
             self._node.sense(DetectionFrame(self.robot_id, Origin(), seen, unread))
 
     def _is_due(self, kind: type, period: float, now: float) -> bool:

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any
 
 import orjson
 from fastapi import APIRouter, HTTPException, Query, Request
@@ -25,6 +25,7 @@ from starlette.background import BackgroundTask
 from iveg.adapters.history import lists
 from iveg.adapters.history.lists import MOST_ROWS, Filter, ListOf, R
 from iveg.adapters.history.queries import Queries
+from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
@@ -52,13 +53,6 @@ _About = tuple[str, float, float, str]
 """Language of the page, since, until (Unix s), and what the pack is about."""
 
 
-class Recordings(Protocol):
-    """Recordings of what came in."""
-
-    async def excerpt(self, target: Path, since: float, until: float) -> int:
-        """Write what came in between two moments (Unix s).  Raises HopError."""
-
-
 class About(Span):
     """Subject of a pack: a range, or one of the rest with its surroundings."""
 
@@ -79,7 +73,7 @@ class Sources:
     """
 
     queries: Queries
-    recordings: Recordings
+    recordings: InputRecorder
     worker: Apart
     rules: Callable[[], Sequence[DetectionRule]]
     settings: Mapping[str, str]
@@ -142,7 +136,8 @@ async def _range(asked: About, sources: Sources) -> tuple[float, float, str]:
         if found is None:
             raise HTTPException(404, f"There is no such {kind}.")
         began = getattr(found, of.at.name)
-        return *_around(began, getattr(found, ends) or began), f"{kind} {wanted}"
+        since, ended = began - BEFORE_S, getattr(found, ends) or began
+        return since, min(ended + AFTER_S, since + LONGEST_S), f"{kind} {wanted}"
     if asked.since is None or asked.until is None:
         raise HTTPException(
             422, "Name a decision, a command, an alert, or since and until."
@@ -151,12 +146,6 @@ async def _range(asked: About, sources: Sources) -> tuple[float, float, str]:
     if until - since > LONGEST_S:
         raise HTTPException(422, "A pack holds an hour at most.")
     return since, until, "range"
-
-
-def _around(began: float, ended: float) -> tuple[float, float]:
-    """Since, until (Unix s): with its surroundings, cut after the longest time."""
-    since = began - BEFORE_S
-    return since, min(ended + AFTER_S, since + LONGEST_S)
 
 
 async def _pack(sources: Sources, folder: Path, about: _About) -> None:
@@ -193,10 +182,17 @@ async def _rows(
     found = {name: await _all(queries, of, asked) for name, of in parts.items()}
     # A note is about a moment, whenever it was written after it.
     later = await _all(queries, lists.NOTES, Filter(since=since, limit=MOST_ROWS))
-    found["notes"] = [
-        one for one in later if since <= one.slots.get("pinned_at", one.at) < until
-    ]
+    found["notes"] = [one for one in later if since <= _moment_of(one) < until]
     return found
+
+
+def _is_note(row: Record) -> bool:
+    return isinstance(row, LogRecord) and row.key == "log.note"
+
+
+def _moment_of(line: LogRecord) -> float:
+    """The moment that a line of the log is about (Unix s)."""
+    return float(line.slots.get("pinned_at", line.at))
 
 
 async def _all(queries: Queries, of: ListOf[R], asked: Filter) -> list[R]:
@@ -213,8 +209,10 @@ def _write(
 ) -> None:
     """The pack, where nothing waits for it."""
     language, since, until, said = about
-    names = ("decisions", "commands", "alerts", "log", "notes")
-    events = [row for name in names for row in rows[name]]
+    # A note stands at the moment that it is about, and once.
+    log = [row for row in rows["log"] if not _is_note(row)]
+    names = ("decisions", "commands", "alerts", "notes")
+    events = [*log, *(row for name in names for row in rows[name])]
     try:
         with zipfile.ZipFile(folder / "pack.zip", "w", zipfile.ZIP_DEFLATED) as pack:
             pack.writestr(
@@ -269,18 +267,12 @@ def write_report(
 
 
 def _lines(rows: Iterable[Record], sentences: Sentences) -> Iterator[Line]:
-    notes: dict[int, Line] = {}
     for row in rows:
         match row:
-            case LogRecord(key="log.note"):
-                text = sentences.say(row.key, row.slots)
-                # It stands at the moment that it is about, and once.
-                notes[row.id] = Line(
-                    row.slots.get("pinned_at", row.at), "note", row.robot_id or "", text
-                )
             case LogRecord():
+                kind = "note" if _is_note(row) else "log"
                 text = sentences.say(row.key, row.slots)
-                yield Line(row.at, "log", row.robot_id or "", text)
+                yield Line(_moment_of(row), kind, row.robot_id or "", text)
             case AlertRecord():
                 text = f"{row.priority} · {sentences.say(row.key, row.slots)}"
                 yield Line(row.last_raised_at, "alert", row.robot_id or "", text)
@@ -292,7 +284,6 @@ def _lines(rows: Iterable[Record], sentences: Sentences) -> Iterator[Line]:
                 kind = sentences.say(f"history.kind.{row.kind}", {})
                 text = f"{kind} · {row.state} · {row.requested_by}"
                 yield Line(row.requested_at, "command", row.robot_id, text)
-    yield from notes.values()
 
 
 @cache

@@ -63,7 +63,6 @@ def test_a_bad_setting_stops_the_start_with_one_sentence(
         ["emulator", "--profile", "dream"],
         ["replay", "log.jsonl"],
         ["replay", "log.jsonl", "--robot", "AGI", "--speed", "0"],
-        ["replay", "log.jsonl", "--robot", "AGI", "--pose", "AGI:1,nan,0"],
         ["replay", "log.jsonl", "--robot", "AGI", "--frame", "our map"],
         ["db", "downgrade"],
     ],

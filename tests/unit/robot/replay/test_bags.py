@@ -11,7 +11,6 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import DetectionFrame, Odometry
-from iveg.robot.replay.bags import AS_RECORDED, BagOptions
 from iveg.robot.replay.replay import open_recording
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as ros
@@ -25,14 +24,12 @@ from tests.unit.robot.ros2.test_detectors import (
     OPTICAL,
     TALL,
     TRUTH,
-    vision_2d,
     vision_3d,
     yolact,
     yolo_2d,
     yolo_3d,
     yolox,
 )
-from tests.unit.robot.ros2.test_pictures import depth, info
 
 FLEET = Pose2D(0.5, 0.0, 0.0)
 """Where the fleet file says that the laser sits."""
@@ -62,13 +59,11 @@ def drive(seconds: float = 0.2) -> list[Said]:
     ]
 
 
-def recorded(
-    path: Path, said_: Sequence[Said], options: BagOptions = AS_RECORDED
-) -> tuple[list[object], list[str]]:
+def recorded(path: Path, said_: Sequence[Said]) -> tuple[list[object], list[str]]:
     """Observations and the table of a bag."""
     lines: list[str] = []
     bag = message_bag(path / "run", said_)
-    recording = open_recording(bag, FLEET, options, tell=lines.append)
+    recording = open_recording(bag, FLEET, tell=lines.append)
     return [one.observation for one in recording()], lines
 
 
@@ -101,7 +96,7 @@ def test_odometry_without_its_transform_is_skipped_and_told(
     assert len(found) == 3
     (told,) = caplog.messages
     assert "/odom: unusable messages are skipped" in told
-    assert told.endswith("no_transform, map → odom")
+    assert told.endswith("unplaced: no_transform, map → odom")
 
 
 # --- detectors ----------------------------------------------------------------------
@@ -111,21 +106,12 @@ def box_3d() -> Any:
     return yolact(OPTICAL, *PERSON)
 
 
-CAMERA: list[Said] = [
-    ("/camera/depth/image", depth(), WALL + 0.1),
-    ("/camera/depth/camera_info", info(), WALL + 0.1),
-]
-
-
 @pytest.mark.parametrize(
     "message",
     [
         vision_3d(OPTICAL, *PERSON),
         yolact(OPTICAL, *PERSON),
         yolo_3d(OPTICAL, *PERSON),
-        vision_2d(MIDDLE, TALL),
-        yolox(MIDDLE, TALL),
-        yolo_2d(MIDDLE, TALL),
     ],
     ids=lambda one: one.ROS,
 )
@@ -133,7 +119,7 @@ def test_a_detector_of_each_family_sees_the_person_where_it_is(
     message: Message, tmp_path: Path
 ) -> None:
     seen = ("/detector", message, WALL + 0.1)
-    bag = message_bag(tmp_path / "run", [*frames(), *drive(), *CAMERA, seen, *drive()])
+    bag = message_bag(tmp_path / "run", [*frames(), *drive(), seen])
 
     found = list(open_recording(bag, FLEET)())
 
@@ -142,7 +128,18 @@ def test_a_detector_of_each_family_sees_the_person_where_it_is(
     (one,) = frame.observation.detections
     assert (one.class_id, one.frame_id) == ("farmer", "map")
     assert math.dist(one.box.centre[:2], TRUTH) <= CLOSE_M
-    assert frame.at == pytest.approx(0.0)
+
+
+def test_boxes_of_a_picture_without_depth_place_nobody(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    seen = ("/detector", yolo_2d(MIDDLE, TALL), WALL + 0.1)
+
+    found, _ = recorded(tmp_path, [*frames(), *drive(), seen])
+
+    assert {type(one) for one in found} == {Odometry}
+    (told,) = caplog.messages
+    assert told.endswith("no_depth: boxes in a picture")
 
 
 # --- what is ignored ----------------------------------------------------------------
@@ -161,10 +158,8 @@ def test_the_table_tells_of_every_topic_what_becomes_of_it(tmp_path: Path) -> No
     read = ["/odom", "/scan", "/tf", "/tf_static"]
     roles = ["odometry", "scan", "tf", "tf_static"]
     assert [fate(lines, topic) for topic in read] == roles
-    assert fate(lines, "/yolox/bounding_box") == (
-        "ignored: boxes in a picture; no --depth-topic with its --camera-info-topic"
-    )
-    assert fate(lines, "/plan") == "ignored: not needed"
+    for topic in ("/yolox/bounding_box", "/plan"):
+        assert fate(lines, topic) == "ignored: not needed"
     (odom,) = (one for one in lines if one.startswith("/odom "))
     assert odom.split() == ["/odom", "nav_msgs/msg/Odometry", "3", "odometry"]
 
@@ -173,16 +168,13 @@ def test_a_type_of_the_same_name_with_other_fields_is_named_by_its_hash(
     tmp_path: Path,
 ) -> None:
     store = get_typestore(Stores.ROS2_JAZZY)
-    for name, text in (
-        ("BoundingBox", "float64 probability\nstring class_id\n"),
-        ("BoundingBoxes", "std_msgs/Header header\nBoundingBox[] bounding_boxes\n"),
-    ):
-        store.register(get_types_from_msg(text, f"bboxes_ex_msgs/msg/{name}"))
+    kind = d.BoundingBoxes3d.ROS
+    store.register(get_types_from_msg("std_msgs/Header header\n", kind))
     lines: list[str] = []
-    seen: list[Said] = [("/yolox", d.BoundingBoxes(OPTICAL), WALL)]
+    seen: list[Said] = [("/seen", d.BoundingBoxes3d(OPTICAL), WALL)]
     bag = message_bag(tmp_path / "run", [*drive(), *seen], store=store)
 
     open_recording(bag, FLEET, tell=lines.append)
 
-    digest = store.hash_rihs01("bboxes_ex_msgs/msg/BoundingBoxes")
-    assert fate(lines, "/yolox") == f"ignored: another definition, {digest}"
+    digest = store.hash_rihs01(kind)
+    assert fate(lines, "/seen") == f"ignored: another definition, {digest}"

@@ -93,16 +93,24 @@ def test_a_bad_line_is_skipped_and_reported_once_with_file_and_number(
     assert why in record.getMessage()
 
 
-def test_an_endless_line_is_one_bad_line(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
+SAW = '{"t":%s,"kind":"detection","class":"farmer","probability":0.9,"x":%s,"y":1}'
+
+
+def test_detections_of_a_moment_are_one_frame_and_then_odometry_is_an_empty_one(
+    tmp_path: Path,
 ) -> None:
-    endless = '{"t":1,"kind":"scan","ranges":[' + "1," * 1_500_000
+    later = (ODOM.replace('"t":0', f'"t":{at}') for at in (1.2, 2.0))
+    saw = SAW % (1.0, 4), SAW % (1.01, 6), SAW % (1.1, 5)
 
-    entries = list(LogReader(written(tmp_path, ODOM, endless, ODOM)).entries())
+    found = LogReader(written(tmp_path, ODOM, *saw, *later)).entries()
 
-    assert len(entries) == 2
-    (record,) = caplog.records
-    assert "line 2 skipped: too_long" in record.getMessage()
+    frames = [one.observation for one in found]
+    xs = [
+        [seen.box.centre[0] for seen in frame.detections]
+        for frame in frames
+        if isinstance(frame, DetectionFrame)
+    ]
+    assert xs == [[4.0], [4.0, 6.0], [5.0], []]
 
 
 MANY = "\n".join(ODOM.replace('"x":1', f'"x":{n}') for n in range(5_000)).encode()
@@ -209,7 +217,7 @@ def test_of_several_robots_one_is_named(path: Path) -> None:
     with pytest.raises(DataFileError, match=r"holds AGI, AGII: name one"):
         entries(path)
     (only,) = entries(path.with_name(path.name + "#AGII"))
-    assert only.observation.robot_id == "AGII"  # type: ignore[union-attr]
+    assert only.observation.robot_id == "AGII"
     with pytest.raises(DataFileError, match="no odometry"):
         entries(path.with_name(path.name + "#D1"))
 
