@@ -93,7 +93,9 @@ def reading_engine(database_url: str) -> Engine:
 def _engine(database_url: str, begin: str, options: str, pool: type[Pool]) -> Engine:
     url = _parse(database_url)
     if url.get_backend_name() == "sqlite":
-        engine = create_engine(_with_timeout(url), poolclass=pool)
+        # Time to wait for a lock (s); an address may set another.
+        url = url.set(query={"timeout": str(_BUSY_TIMEOUT_S), **url.query})
+        engine = create_engine(url, poolclass=pool)
         event.listen(engine, "connect", _prepare_sqlite)
         event.listen(engine, "begin", lambda one: one.exec_driver_sql(begin))
         return engine
@@ -111,13 +113,6 @@ def _engine(database_url: str, begin: str, options: str, pool: type[Pool]) -> En
     except ModuleNotFoundError as error:
         wanted = "psycopg", "postgresql"
         raise MissingExtraError("IVEG_DATABASE_URL", *wanted) from error
-
-
-def _with_timeout(url: URL) -> URL:
-    """Time to wait for a lock; the URL may set another: ``?timeout=0.5``."""
-    if "timeout" in url.query:
-        return url
-    return url.update_query_dict({"timeout": str(_BUSY_TIMEOUT_S)})
 
 
 def _prepare_sqlite(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:

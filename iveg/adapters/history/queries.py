@@ -9,9 +9,10 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from sqlalchemy import Connection, Engine, Select, insert, select
+from sqlalchemy import Connection, Engine, RowMapping, Select, Table, insert, select
 from sqlalchemy.exc import SQLAlchemyError
 
 from iveg.adapters.history import lists
@@ -19,14 +20,12 @@ from iveg.adapters.history.engine import reading_engine, reason_of
 from iveg.adapters.history.lists import Filter, ListOf, Page, R, record_of
 from iveg.adapters.history.recorder import Store
 from iveg.adapters.history.tables import (
+    OPEN,
     access_moved,
     accounts,
     alerts,
     api_tokens,
     command_events,
-    commands,
-    decisions,
-    is_open_command,
 )
 from iveg.domain.accounts import Access, Account, ApiToken
 from iveg.domain.errors import HopError
@@ -98,60 +97,50 @@ class Queries:
         **named: P.kwargs,
     ) -> T:
         """Answer of a question, such as ``speed_series`` of ``series``."""
+        work = partial(ask, self._engine, question, *args, **named)
+        return await asyncio.get_running_loop().run_in_executor(self._threads, work)
 
-        def asked() -> T:
-            return ask(self._engine, question, *args, **named)
-
-        return await asyncio.get_running_loop().run_in_executor(self._threads, asked)
-
-    async def page(self, of: ListOf[R], asked: Filter) -> Page[R]:
+    async def page(self, listed: ListOf[R], wanted: Filter) -> Page[R]:
         """One page of a list."""
-        return await self.ask(lists.read_page, of, asked)
+        return await self.ask(lists.read_page, listed, wanted)
 
     async def pages(
-        self, of: ListOf[R], first: Page[R], asked: Filter
+        self, listed: ListOf[R], first: Page[R], wanted: Filter
     ) -> AsyncIterator[Sequence[R]]:
         """Rows of the first page that was asked for so, and of all after it."""
         page = first
         yield page.items
         while page.next is not None:
-            page = await self.page(of, replace(asked, cursor=page.next))
+            page = await self.page(listed, replace(wanted, cursor=page.next))
             yield page.items
 
-    async def one(self, of: ListOf[R], key: str) -> R | None:
+    async def one(self, listed: ListOf[R], key: str) -> R | None:
         """The record of that key; None when it is not known."""
-        wanted = select(of.table).where(of.key == key)
-        return next(iter(await self.ask(_records, of.kind, wanted)), None)
+        wanted = select(listed.table).where(listed.key == key)
+        return next(iter(await self.ask(_records, listed.kind, wanted)), None)
 
     async def open_commands(self) -> tuple[CommandRecord, ...]:
-        """Commands whose last row says that they still go on, oldest first."""
-        c = commands.c
-        wanted = (
-            select(commands)
-            .where(is_open_command())
-            .order_by(c.requested_at, c.command_id)
-        )
-        return await self.ask(_records, CommandRecord, wanted)
+        """Commands that still go on, oldest first."""
+        return await self._open(lists.COMMANDS)
 
     async def open_decisions(self) -> tuple[DecisionRecord, ...]:
-        """Decisions whose last row has no end."""
-        wanted = select(decisions).where(decisions.c.ended_at.is_(None))
-        return await self.ask(_records, DecisionRecord, wanted)
+        """Decisions without an end, oldest first."""
+        return await self._open(lists.DECISIONS)
 
     async def open_alerts(self) -> tuple[AlertRecord, ...]:
-        """Alerts whose last row says that they are active."""
-        wanted = select(alerts).where(alerts.c.cleared_at.is_(None))
-        return await self.ask(_records, AlertRecord, wanted)
+        """Active alerts, oldest first."""
+        return await self._open(lists.ALERTS)
+
+    async def _open(self, listed: ListOf[R]) -> tuple[R, ...]:
+        is_open = select(listed.table).where(OPEN[listed.table])
+        wanted = is_open.order_by(listed.at, listed.key)
+        return await self.ask(_records, listed.kind, wanted)
 
     async def unseen_alerts(self, most: int) -> tuple[AlertRecord, ...]:
         """The newest P1s that nobody has acknowledged, active or over."""
         a = alerts.c
-        wanted = (
-            select(alerts)
-            .where(a.priority == "P1", a.acknowledged_at.is_(None))
-            .order_by(a.last_raised_at.desc(), a.alert_id.desc())
-            .limit(most)
-        )
+        unseen = select(alerts).where(a.priority == "P1", a.acknowledged_at.is_(None))
+        wanted = unseen.order_by(a.last_raised_at.desc(), a.alert_id.desc()).limit(most)
         return await self.ask(_records, AlertRecord, wanted)
 
     async def command_events(self, command_id: str) -> tuple[CommandEventRecord, ...]:
@@ -209,11 +198,13 @@ def mark_moved(url: str, now: float) -> None:
 def _read(connection: Connection) -> Access | None:
     if connection.execute(select(access_moved)).first() is not None:
         return None
-    known = [one for one in accounts.c if one.key not in ("name_key", "language")]
-    people = connection.execute(select(*known)).mappings()
-    known = [one for one in api_tokens.c if one.key != "name_key"]
-    programs = connection.execute(select(*known)).mappings()
+    people, programs = _rows(connection, accounts), _rows(connection, api_tokens)
     return Access(
         tuple(Account(**row) for row in people),
         tuple(ApiToken(**row) for row in programs),
     )
+
+
+def _rows(connection: Connection, table: Table) -> Sequence[RowMapping]:
+    known = (one for one in table.c if one.key not in ("name_key", "language"))
+    return connection.execute(select(*known)).mappings().all()

@@ -7,7 +7,7 @@ answers "what did this robot do then", which time travel, retention and charts a
 states arrive.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, get_origin
 
@@ -327,10 +327,17 @@ AGES: dict[str, Column[Any]] = {
 """Table → the column by which its rows age (Unix s)."""
 
 
-def is_open_command() -> ColumnElement[bool]:
-    """Whether the last row of a command says that it still goes on."""
+def _is_open_command() -> ColumnElement[bool]:
     c = commands.c
     stops = and_(c.kind == "stop", c.state.not_in(("RUNNING", "REPLACED", "EXPIRED")))
     goals = and_(c.kind == "goal", c.state.in_(OPEN_STATES))
     # A release that was refused or confirmed keeps the state that followed.
     return or_(stops, and_(c.kind != "stop", c.state == "RELEASING"), goals)
+
+
+OPEN: Mapping[Table, ColumnElement[bool]] = {
+    decisions: decisions.c.ended_at.is_(None),
+    commands: _is_open_command(),
+    alerts: alerts.c.cleared_at.is_(None),
+}
+"""Condition of a table's rows whose thing goes on, by their last state."""

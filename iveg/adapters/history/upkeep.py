@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 from sqlalchemy import (
-    ColumnElement,
     Connection,
     Table,
     TextClause,
@@ -35,6 +34,7 @@ from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder
 from iveg.adapters.history.tables import (
     AGES,
+    OPEN,
     decisions,
     detections,
     log,
@@ -54,12 +54,6 @@ from iveg.vital.supervision import Supervision
 PIECE = 10_000
 """Rows of one transaction; more where many are of one moment."""
 
-_OVER: Mapping[str, ColumnElement[bool]] = {
-    # What goes on is kept whatever its age.
-    "decisions": tables.decisions.c.ended_at.is_not(None),
-    "commands": ~tables.is_open_command(),
-    "alerts": tables.alerts.c.cleared_at.is_not(None),
-}
 _GUARD = "audit_no_delete"
 
 
@@ -76,7 +70,8 @@ def purge_piece(connection: Connection, step: PurgeStep, before: float) -> int:
     """
     table, at = metadata.tables[step.table], AGES[step.table]
     dialect = connection.dialect.name
-    which = _OVER.get(step.table, true())
+    # What goes on is kept whatever its age.
+    which = ~OPEN[table] if table in OPEN else true()
     if step.kind == "positions":
         which = tables.PLACED[step.table].dialect_options[dialect]["where"]
     due = and_(at < before, which)

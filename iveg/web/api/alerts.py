@@ -165,8 +165,7 @@ def notes_router(
 async def _is_recorded(queries: Queries, robot: str) -> bool:
     """Whether a decision, an order or an alert names a robot that left the fleet."""
     wanted = lists.Filter(robot=robot, limit=1)
-    return bool(
-        (await queries.page(lists.DECISIONS, wanted)).items
-        or (await queries.page(lists.COMMANDS, wanted)).items
-        or (await queries.page(lists.ALERTS, wanted)).items
-    )
+    for listed in (lists.DECISIONS, lists.COMMANDS, lists.ALERTS):
+        if (await queries.page(listed, wanted)).items:
+            return True
+    return False

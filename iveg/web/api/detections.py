@@ -23,7 +23,7 @@ from iveg.vital.ports import Clock
 from iveg.web.api import exports
 from iveg.web.api.answers import FEW_ROWS, Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
-from iveg.web.api.history_filters import NewestFilters, admitting
+from iveg.web.api.history_filters import RowFilters, admitting
 from iveg.web.pages.sentences import in_madrid, start_of
 from iveg.web.security.requirements import READERS, Operator, refusals
 
@@ -43,7 +43,7 @@ def router(newest: NewestDetections, worker: Apart) -> APIRouter:
         responses={200: {"content": {one: {} for one in MEDIA_TYPES.values()}}},
     )
     async def latest(
-        request: Request, asked: Annotated[NewestFilters, Query()]
+        request: Request, asked: Annotated[RowFilters, Query()]
     ) -> Response:
         """Each detection of the last moments, none left out, newest first."""
         form = asked.format or exports.form_of(request.headers)

@@ -30,7 +30,6 @@ R = TypeVar("R", bound=Record)
 LONGEST_RANGE_S = 31 * 86_400.0
 _FIRST_DAY, _LAST_DAY = date(1970, 1, 2), date(9000, 1, 1)
 """Days with which time zones and ranges can be computed."""
-NO_DAY = "no day of any history"
 _USUAL_RANGE_S = 15 * 60.0
 _ROBOT_ID = r"^[A-Za-z0-9-]{1,64}$"
 _NO_CONTROLS = r"^[^\x00-\x1f]*$"
@@ -53,14 +52,9 @@ def _in_utc(moment: datetime) -> datetime:
 
 def as_kept(day: date) -> date:
     """The day, if a history may have it.  Raises PydanticCustomError."""
-    if not is_kept(day):
-        raise PydanticCustomError("day", NO_DAY)
+    if not _FIRST_DAY <= day <= _LAST_DAY:
+        raise PydanticCustomError("day", "no day of any history")
     return day
-
-
-def is_kept(day: date) -> bool:
-    """Whether a history may have this day."""
-    return _FIRST_DAY <= day <= _LAST_DAY
 
 
 Moment = Annotated[datetime, BeforeValidator(mend_plus), AfterValidator(_in_utc)]
@@ -110,11 +104,6 @@ class RowFilters(Range):
     limit: int | None = Field(
         None, ge=1, le=lists.MOST_ROWS, description="Rows of a page; 100 unless told"
     )
-
-
-class NewestFilters(RowFilters):
-    """Filters of a list that is in memory, and its form."""
-
     format: Form | None = Field(None, description="Instead of an `Accept` header")
 
 
@@ -124,27 +113,26 @@ class Filters(RowFilters):
     cursor: str | None = Field(
         None, max_length=200, description="`next` of the page before"
     )
-    format: Form | None = Field(None, description="Instead of an `Accept` header")
     language: Literal["es", "en"] | None = Field(
         None,
         description="CSV as that reader's spreadsheet expects it, with sentences",
     )
 
 
-def admitting(asked: RowFilters) -> Callable[[JudgedDetection], bool]:
+def admitting(wanted: RowFilters) -> Callable[[JudgedDetection], bool]:
     """Whether a detection that is in memory is one of those that are asked for."""
-    since, until = seconds(asked.since), seconds(asked.until)
+    since = seconds(wanted.since) or float("-inf")
+    until = seconds(wanted.until) or float("inf")
 
     def admits(judged: JudgedDetection) -> bool:
-        one, frame, received = judged
-        person = None if one.person is None else one.person.person_id
+        seen, frame, received = judged
+        person = None if seen.person is None else seen.person.person_id
         return (
-            (since is None or received.at.wall >= since)
-            and (until is None or received.at.wall < until)
-            and asked.robot in (None, frame.robot_id)
-            and asked.class_ in (None, one.class_, one.detection.class_id)
-            and asked.person in (None, person)
-            and one.detection.probability >= (asked.min_probability or 0.0)
+            since <= received.at.wall < until
+            and wanted.robot in (None, frame.robot_id)
+            and wanted.class_ in (None, seen.class_, seen.detection.class_id)
+            and wanted.person in (None, person)
+            and seen.detection.probability >= (wanted.min_probability or 0.0)
         )
 
     return admits
