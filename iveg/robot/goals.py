@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from iveg.domain import wire
 from iveg.domain.errors import UnreadableError
@@ -146,7 +146,7 @@ class _Named(wire.Wire, extra="forbid"):
     id: Annotated[wire.Text, Field(min_length=1)]
 
 
-class _Set(_Named):
+class _Given(_Named):
     kind: GoalKind
     x: wire.Metres
     y: wire.Metres
@@ -154,9 +154,15 @@ class _Set(_Named):
     until: float
 
 
-class _Value(wire.Wire, extra="forbid"):
-    set: _Set | None = None
-    cancel: _Named | None = None
+class _Set(wire.Wire, extra="forbid"):
+    set: _Given
+
+
+class _Cancel(wire.Wire, extra="forbid"):
+    cancel: _Named
+
+
+_ORDER: TypeAdapter[_Set | _Cancel] = TypeAdapter(_Set | _Cancel)
 
 
 def read_goal(payload: bytes) -> GoalOrder | CancelOrder | None:
@@ -171,13 +177,12 @@ def read_goal(payload: bytes) -> GoalOrder | CancelOrder | None:
         message = load_json(payload)
         if not isinstance(message, dict) or message.keys() != {names.GOAL}:
             return None
-        value = _Value.model_validate(message[names.GOAL])
+        order = _ORDER.validate_python(message[names.GOAL])
     except (UnreadableError, ValidationError):
         return None
-    if value.cancel is not None and value.set is None:
-        return CancelOrder(value.cancel.id)
-    if value.set is None or value.cancel is not None:
-        return None
-    order = value.set
-    goal = Goal(order.id, order.kind, order.x, order.y)
-    return GoalOrder(goal, order.ch, order.until)
+    if isinstance(order, _Cancel):
+        return CancelOrder(order.cancel.id)
+    given = order.set
+    return GoalOrder(
+        Goal(given.id, given.kind, given.x, given.y), given.ch, given.until
+    )

@@ -1,6 +1,7 @@
 """Alerts of peers as last received, and which of them count for a robot."""
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -163,15 +164,12 @@ def alerts_of(feedback: Feedback) -> dict[AlertKey, FeedbackAlert]:
     if feedback.alert is not None and feedback.alert not in alerts:
         alerts.append(feedback.alert)
     found: dict[AlertKey, FeedbackAlert] = {}
+    counts = Counter[tuple[str, str | None, str]]()
     for alert in alerts:
-        if alert.class_ is None:
-            continue
-        number = 0
-        while (
-            key := (alert.decision_id, alert.observer, alert.class_, number)
-        ) in found:
-            number += 1
-        found[key] = alert
+        if alert.class_ is not None:
+            shared = alert.decision_id, alert.observer, alert.class_
+            found[*shared, counts[shared]] = alert
+            counts[shared] += 1
     return found
 
 

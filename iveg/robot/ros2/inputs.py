@@ -8,9 +8,8 @@ more than its bytes.
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D
@@ -28,41 +27,12 @@ from iveg.robot.ros2 import reading
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.detections import Boxes, Camera, Places
 from iveg.robot.ros2.outputs import Network, Reader
-from iveg.robot.ros2.reading import InputFaults
+from iveg.robot.ros2.reading import InputFaults, Stamps
 from iveg.robot.ros2.topics import ROS_SENSORS, TOPICS, RosSensor, sensed_topics
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as ros
 from iveg.ros2.messages import Message, definitions
 from iveg.ros2.names import Endpoint
-
-# --- stamps -----------------------------------------------------------------------
-#
-# Order of one topic's messages by their stamps, until its clock was set back.
-
-Verdict = Literal["new", "same", "back", "reset"]
-_BACK_MESSAGES = 5
-
-
-@dataclass(slots=True)
-class Stamps:
-    """Newest stamp of one topic (s), and how many in a row were before it."""
-
-    newest: float = 0.0
-    back: int = 0
-
-    def verdict(self, stamp: float) -> Verdict:
-        """``new``, ``same``, ``back``, or ``reset`` when the clock was set back."""
-        if stamp > self.newest or stamp == 0.0:
-            self.newest, self.back = max(stamp, self.newest), 0
-            return "new"
-        if stamp == self.newest:
-            return "same"
-        self.back += 1
-        if self.back < _BACK_MESSAGES:
-            return "back"
-        self.newest, self.back = stamp, 0
-        return "reset"
-
 
 # --- subscriptions ----------------------------------------------------------------
 

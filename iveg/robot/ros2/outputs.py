@@ -18,7 +18,7 @@ from iveg.robot.costmap import FleetCostmap
 from iveg.robot.node import RobotNode
 from iveg.robot.peer_alerts import Neighbour
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.reading import InputFaults, read_twist, write_twist
+from iveg.robot.ros2.reading import InputFaults, Stamps, read_twist, write_twist
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as ros
 from iveg.ros2.messages import Message
@@ -82,7 +82,7 @@ class DriveTopics:
         self._topic = config.full_topics["cmd_vel_in"]
         self._base_link = config.frames.base_link
         self._input_faults = input_faults
-        self._newest = 0.0
+        self._stamps = Stamps()
 
     def read(self, payload: bytes, now: float) -> Twist2D | None:
         """The twist that upstream requests; None if older than the one before."""
@@ -96,15 +96,10 @@ class DriveTopics:
             return REST
 
     def _is_old(self, stamped: ros.TwistStamped, now: float) -> bool:
-        stamp = stamped.header.stamp.seconds
-        if stamp == 0.0:  # the sender sets no stamp
-            return False
-        # A clock that was set back by more than the lifetime of a twist is accepted.
-        if self._newest - 1.0 < stamp <= self._newest:
+        verdict = self._stamps.verdict(stamped.header.stamp.seconds)
+        if verdict in ("same", "back"):
             self._input_faults.note("time_back", self._topic, now)
-            return True
-        self._newest = stamp
-        return False
+        return verdict in ("same", "back")
 
     def write(self, twist: Twist2D, wall: float) -> bytes:
         """Bytes for the base; ``wall`` is the robot's clock (Unix s)."""

@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -228,6 +229,29 @@ def read_path(path: ros.Path, place: RigidTransform) -> Navigation:
 def clean(text: str) -> str:
     """Text without characters that Orion refuses."""
     return clean_text(text.translate(_FORBIDDEN)).strip()
+
+
+# --- stamps -----------------------------------------------------------------------
+
+Verdict = Literal["new", "same", "back", "reset"]
+_SET_BACK_S = 1.0
+
+
+@dataclass(slots=True)
+class Stamps:
+    """Newest stamp of one topic (s): 0 before the first."""
+
+    newest: float = 0.0
+
+    def verdict(self, stamp: float) -> Verdict:
+        """``new``, ``same``, ``back``, or ``reset`` when the clock was set back."""
+        if stamp == 0.0:  # the sender sets no stamp
+            return "new"
+        before, back_s = self.newest, self.newest - stamp
+        if back_s == 0.0 or 0.0 < back_s < _SET_BACK_S:
+            return "back" if back_s else "same"
+        self.newest = stamp
+        return "new" if stamp > before else "reset"
 
 
 # --- input faults -----------------------------------------------------------------
