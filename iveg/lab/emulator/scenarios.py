@@ -1,4 +1,6 @@
-"""Named runs as data: routes of robots, rounds of people, expected outcome.
+"""Named runs as data: routes of robots and rounds of people.
+
+What each shows is in ``docs/emulator.md``.
 
 All but ``nlos-field`` are written for the testbed of the paper (``mvsim-20x20``):
 corridors lie at x = 2, 6, 10, 14, 18 m, crop between them at x = 4, 8, 12, 16 m from
@@ -251,22 +253,17 @@ class Scenario:
     """One named run.
 
     Attributes:
-        about: Purpose in one sentence.
-        outcome: Expected outcome in iVeg; checked by a test of the whole stack.
         robots: Scripts by robot id; a fleet with other ids uses the route of ``many``.
         people: Stops of each person.
         greenhouse: The greenhouse that it is written for.
     """
 
     name: str
-    about: str
-    outcome: str
     robots: Mapping[str, RobotScript]
     people: tuple[tuple[WalkStop, ...], ...] = ()
     greenhouse: str = TESTBED
 
 
-_FOREVER_S = 1e9
 _NORTH, _SOUTH, _WEST = math.pi / 2, -math.pi / 2, math.pi
 
 # --- robots of the testbed --------------------------------------------------------
@@ -288,7 +285,7 @@ _WATCH = RobotScript(
     _SCOUT_CORNERS,
     0.6,
     "watching",
-    stations=(Station(10.0, 4.0, period_s=_FOREVER_S, offset_s=_FOREVER_S),),
+    stations=(Station(10.0, 4.0, dwell_s=math.inf),),
 )
 _HAUL_CORNERS = ((18.0, 2.0), (18.0, 18.0), (13.2, 18.0), (13.2, 2.0))
 _HAUL = RobotScript(
@@ -326,7 +323,7 @@ _OPPOSITE = RobotScript(
     0.0,
     "watching",
     closed=False,
-    stations=(Station(14.9, 5.7, period_s=_FOREVER_S, offset_s=_FOREVER_S),),
+    stations=(Station(14.9, 5.7, dwell_s=math.inf),),
 )
 
 # --- people of the testbed --------------------------------------------------------
@@ -371,7 +368,7 @@ _FACES_GROWER = RobotScript(
     0.0,
     "watching",
     closed=False,
-    stations=(Station(25.0, 31.4, period_s=_FOREVER_S, offset_s=_FOREVER_S),),
+    stations=(Station(25.0, 31.4, dwell_s=math.inf),),
 )
 _FACES_AWAY = RobotScript(
     Pose2D(20.0, 23.9, _WEST),
@@ -387,66 +384,46 @@ _GROWER_IN_6 = (WalkStop(24.3, 25.5, 60.0, 60.0),)
 _SCENARIOS = (
     Scenario(
         "demo",
-        "Two robots and four people; robots slow for people seen and unseen.",
-        "AGII slows for the worker whom only AGI sees, and drives on afterwards.",
         {"AGI": _SCOUT, "AGII": _HAUL},
         _FOUR_PEOPLE,
     ),
     Scenario(
         "nlos",
-        "AGI sees a person across the crop from AGII.",
-        "AGII slows for the person without a line of sight; AGI is the observer.",
         {"AGI": _WATCH, "AGII": _HAUL_ON},
         (_PICKER_IN_3,),
     ),
     Scenario(
         "nlos-field",
-        "AGII reverses along the central corridor and looks away from the aisle where "
-        "AGI faces a grower.",
-        "AGII slows for the grower without a line of sight; AGI is the observer.",
         {"AGI": _FACES_GROWER, "AGII": _FACES_AWAY},
         (_GROWER_IN_6,),
         greenhouse="agroconnect",
     ),
     Scenario(
         "viewpoints",
-        "One person, seen from all sides as AGI goes round.",
-        "It stays one person at one place, seen from the south and from the north.",
         {"AGI": _LAPS, "AGII": _HAUL},
         (_STANDER,),
     ),
     Scenario(
         "peers",
-        "AGI and AGII pass each other again and again in corridor 4; nobody else.",
-        "Both slow for each other.",
         {"AGI": _BESIDE, "AGII": _HAUL_ON},
     ),
     Scenario(
         "together",
-        "A person and AGII in one frame of AGI.",
-        "One look holds both; the person is an alert, AGII is known for a peer.",
         {"AGI": _OPPOSITE, "AGII": _HAUL_ON},
         ((WalkStop(15.1, 10.5, 10.0, 20.0), WalkStop(15.1, 11.5, 10.0, 20.0)),),
     ),
     Scenario(
         "occluded",
-        "A person half hidden by the end of a crop row.",
-        "AGI is less sure of the person while half hidden, and slows in time.",
         {"AGI": _PAST_THE_END, "AGII": _HAUL},
         (_AT_THE_END,),
     ),
     Scenario(
         "many",
-        "Any number of robots on one round, four people inside.",
-        "All are live and drive; none is lost.",
         {},
         _FOUR_PEOPLE,
     ),
     Scenario(
         "crossing",
-        "A person crosses in front of AGI; with the profile `noisy` the detector "
-        "flickers about the threshold.",
-        "AGI slows once and speeds up once.",
         {"AGI": _THROUGH, "AGII": _HAUL},
         (_CROSSER,),
     ),

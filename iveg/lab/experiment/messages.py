@@ -33,7 +33,7 @@ from iveg.domain.observations import kind_of
 from iveg.ngsi import codec, names
 from iveg.settings import Settings
 
-COUNTS: Final = ("sent", "lost", "reordered", "orion_first")
+COUNTS: Final = ("sent", "lost", "orion_first")
 HOPS: Final[tuple[Segment, ...]] = ("uplink", "fiware", "robot_orion")
 
 
@@ -73,9 +73,8 @@ class MessageTimes:
 
 
 def counts_of(times: Iterable[MessageTimes]) -> dict[Data, dict[str, int]]:
-    """Messages at the broker; of these lost, out of order, or first at Orion."""
+    """Messages at the broker; of these lost, or first at Orion."""
     counts = {data: dict.fromkeys(COUNTS, 0) for data in DATA}
-    copies = []
     for message in times:
         count = counts[message.data]
         count["sent"] += 1
@@ -83,13 +82,6 @@ def counts_of(times: Iterable[MessageTimes]) -> dict[Data, dict[str, int]]:
             count["lost"] += 1
         else:
             count["orion_first"] += message.orion < message.broker
-            copies.append((message.orion, message))
-    newest: dict[tuple[str, Data, str], int] = {}
-    for _, message in sorted(copies, key=lambda copy: copy[0]):
-        stream = message.robot_id, message.data, message.boot
-        before = newest.get(stream, message.seq)
-        counts[message.data]["reordered"] += message.seq < before
-        newest[stream] = max(message.seq, before)
     return counts
 
 

@@ -3,7 +3,7 @@
 Raw data has one file for each kind of row, one JSON object a line::
 
     raw/together-1/run.json           scenario, seed, ends of both halves
-    raw/together-1/truth.ndjson …     truth, reported, encounters, decisions
+    raw/together-1/truth.ndjson …     truth, reported, encounters
     raw/together-1/messages.ndjson    times of each message of the half in real time
     raw/demo-field-paper-1/…          a run for protection: the virtual half alone
 
@@ -107,7 +107,6 @@ def counted_of(run: VirtualRecording) -> Outcome:
     return {
         "pictures": len(run.reported),
         "classes": tally(zip(truth, run.reported, strict=True)),
-        "slowdowns": slowdowns_of(run.decisions),
         "protection": protection_of(moments_of(run.truth, run.foretold)),
     }
 
@@ -118,17 +117,6 @@ def timed_of(run: TimedRecording) -> Outcome:
         "completed": run.completed,
         "messages": counts_of(run.times),
         "hops_ms": hops_of(run.times),
-    }
-
-
-def slowdowns_of(decisions: Sequence[Mapping[str, object]]) -> dict[str, int]:
-    """Decisions that slowed a robot: number, applied, observed, out of sight."""
-    slowed = [row for row in decisions if row["reason"] in ("person", "robot")]
-    return {
-        "decided": len(slowed),
-        "applied": sum(row["applied_at"] is not None for row in slowed),
-        "observed": sum(row["observed_at"] is not None for row in slowed),
-        "out_of_sight": sum(row["in_sight"] is False for row in slowed),
     }
 
 
@@ -161,8 +149,6 @@ def result_of(
         "completed": sum(half["completed"] for half in timed),
         "detection": {name: _scored([name], counted) for name in CLASSES},
         "global": _scored(CLASSES, counted),
-        "slowdowns": _sum(half["slowdowns"] for half in counted),
-        "protected": _protected(plan, outcomes),
         "protection": [*_protection(outcomes)],
         "latency": [*_rows(timed)],
         "runs": list(outcomes),
@@ -172,13 +158,6 @@ def result_of(
 def timed_runs(result: Json) -> list[Outcome]:
     """Its runs of the paper's scenarios, which have both halves."""
     return [run for run in result["runs"] if run["timed"] is not None]
-
-
-def _protected(plan: ExperimentPlan, outcomes: Sequence[Outcome]) -> Json | None:
-    """All virtual runs with the experiment's own detector and the rule as it stands."""
-    own = {"profile": plan.profile, "rule": "iveg"}
-    runs = [run["counted"] for run in outcomes if own.items() <= run.items()]
-    return total_of(half["protection"] for half in runs).row() if runs else None
 
 
 def _protection(outcomes: Sequence[Outcome]) -> Iterator[dict[str, object]]:
@@ -246,7 +225,6 @@ def write_raw(
     _write_rows(directory / "truth.ndjson", virtual.truth)
     _write_rows(directory / "reported.ndjson", virtual.reported)
     _write_rows(directory / "encounters.ndjson", virtual.foretold)
-    _write_rows(directory / "decisions.ndjson", virtual.decisions)
     kept = ("family", "number", "seed", "profile", "rule")
     document: dict[str, object] = {name: outcome[name] for name in kept}
     if real is not None:

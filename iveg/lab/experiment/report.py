@@ -4,7 +4,7 @@ It follows the theme of the reader's browser and needs no script; its tables are
 ``report.html``.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from importlib.resources import files
 
 from jinja2 import Environment, StrictUndefined
@@ -13,7 +13,7 @@ from markupsafe import Markup
 from iveg.domain.latency import PAPER
 from iveg.domain.records import Json
 from iveg.lab.experiment import outcome
-from iveg.lab.experiment.outcome import COMPLETION, P95_BELOW_MS, PRINTED, timed_runs
+from iveg.lab.experiment.outcome import COMPLETION, P95_BELOW_MS, timed_runs
 
 Result = Json
 
@@ -26,7 +26,6 @@ def write_report(result: Result) -> str:
     environment = Environment(autoescape=True, undefined=StrictUndefined)
     environment.filters |= {
         "decimals": _decimals,
-        "interval": _interval,
         "percent": _percent,
         "rate": _rate,
         "whole": _whole,
@@ -45,14 +44,6 @@ def write_report(result: Result) -> str:
 
 def _decimals(value: float | None, digits: int = 1) -> str:
     return "–" if value is None else f"{value:.{digits}f}"
-
-
-def _interval(rate: Mapping[str, float] | None) -> str:
-    """One share with its interval of confidence; a dash for none."""
-    if rate is None:
-        return "–"
-    share, low, high = (100.0 * rate[name] for name in ("share", "low", "high"))
-    return f"{share:.1f} % [{low:.1f}, {high:.1f}]"
 
 
 def _percent(share: float | None) -> str:
@@ -82,13 +73,11 @@ def conclusions(result: Result) -> Iterator[str]:
 
     A number stands beside the paper's where the paper has one.
     """
-    if result["protected"] is not None:
-        yield _protection(result["protected"])
+    by_rule = (row for row in result["protection"] if row["rule"] == "iveg")
+    if (protected := next(by_rule, None)) is not None:
+        yield _protection(protected)
     if runs := len(timed_runs(result)):
         yield _completion(result["completed"], runs)
-        yield _slow_downs(result["slowdowns"])
-    if (farmer := result["detection"]["farmer"])["recall"] is not None:
-        yield from _detection(farmer)
     yield from _latency(result)
 
 
@@ -109,34 +98,6 @@ def _completion(completed: int, runs: int) -> str:
     return (
         f"{completed} of {runs} runs were completed through all programs; "
         f"the paper: {paper} in the field."
-    )
-
-
-def _slow_downs(slowed: Mapping[str, int]) -> str:
-    decided, applied, observed, unseen = (
-        slowed.get(name, 0)
-        for name in ("decided", "applied", "observed", "out_of_sight")
-    )
-    return (
-        f"iVeg decided {decided} slow-downs: {applied} were applied by the robot's own "
-        f"report, {observed} were seen in its speed, and {unseen} were for somebody "
-        f"whom the robot could not see."
-    )
-
-
-def _detection(farmer: Json) -> Iterator[str]:
-    if farmer["precision"] is None:
-        return
-    recall, precision = (
-        _percent(farmer[rate]["share"]) for rate in ("recall", "precision")
-    )
-    simulation, field = (PRINTED[place]["farmer"] for place in ("simulation", "field"))
-    yield (
-        f"The emulated detector told of {recall} of the farmers in view, and "
-        f"{precision} of what it called a farmer was one. The paper: "
-        f"{simulation.recall}% and "
-        f"{simulation.precision}% in simulation, {field.recall}% and "
-        f"{field.precision}% in the field."
     )
 
 

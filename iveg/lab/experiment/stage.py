@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Final
 
@@ -45,13 +45,11 @@ class VirtualRecording:
         reported: Detections of each of these pictures, as iVeg shows them.
         foretold: Encounters with people as iVeg published them at each picture
             (``protection.moments_of``).
-        decisions: Each with ``reason``, ``applied_at``, ``observed_at``, ``in_sight``.
     """
 
     truth: list[Row] = field(default_factory=list)
     reported: list[Picture] = field(default_factory=list)
     foretold: list[Row] = field(default_factory=list)
-    decisions: list[Row] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -340,8 +338,6 @@ class VirtualRun:
             self._report()
             if number % _REST_EVERY == 0:
                 await asyncio.sleep(0)
-        decisions = self._iveg.decisions.values()
-        self._result.decisions = [asdict(decision) for decision in decisions]
         return self._result
 
     def _looked(self, rig: RobotHardware) -> None:
