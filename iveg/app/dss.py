@@ -59,7 +59,6 @@ from iveg.web.live.pictures import Past, PictureRecorder
 from iveg.web.notifications import Followers, NotificationEndpoint
 from iveg.web.pages import sentences
 from iveg.web.pages.contexts import Site
-from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)
@@ -101,10 +100,7 @@ class Dss:
         by_link = settings.sign_in == "link" or demo
         link = settings.sign_in_token or secrets.token_hex(32)
         self.sign_in_token = link if by_link else ""
-        self.notify_secret = NotifySecret(
-            settings.notify_token or secrets.token_hex(32),
-            settings.notify_token_previous,
-        )
+        self.notify_secret = settings.notify_token or secrets.token_hex(32)
         boot = secrets.token_hex(8)
         self.pipeline = Pipeline(
             fleet,
@@ -198,7 +194,7 @@ class Dss:
 
     def _provisioner(self) -> Provisioner:
         outside, core = self.outside, self.core
-        secret = self.notify_secret.current
+        secret = self.notify_secret
         return Provisioner(
             outside.orion,
             outside.agent,
