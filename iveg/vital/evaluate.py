@@ -35,7 +35,7 @@ from iveg.vital import topics
 from iveg.vital.alerting import Alerting
 from iveg.vital.core import Core
 from iveg.vital.detections import DetectionTracking
-from iveg.vital.evidence import evidence_of, places_of, record_of, speed_line
+from iveg.vital.evidence import cause_of, places_of, record_of, speed_line
 from iveg.vital.feedback import FeedbackPublisher
 from iveg.vital.staleness import Staleness
 
@@ -74,6 +74,8 @@ class Evaluator:
         self._low = LowValues()
         self._obedience = Obedience()
         self._moved: dict[str, Odometry] = {}
+        self._unlogged: dict[str, SafetyReport] = {}
+        """Reports of another factor; the next judgement may make their decisions."""
         self._unjudged: Instant | None = None
         self._started: Instant | None = None
 
@@ -156,6 +158,9 @@ class Evaluator:
                 odometry, robot, speed_limit.speed_factor, robot.link(now), now
             )
         self._moved.clear()
+        for report in self._unlogged.values():
+            self._log_speed(report, now)
+        self._unlogged.clear()
 
     def _drove(self, odometry: Odometry, at: Instant) -> None:
         robot = self.world.robot(odometry.robot_id)
@@ -175,7 +180,8 @@ class Evaluator:
             self._await_judgement(at)
         if report.speed_factor != self._applied.get(report.robot_id):
             self._applied[report.robot_id] = report.speed_factor
-            self._log_speed(report, at)
+            self._unlogged[report.robot_id] = report
+            self._await_judgement(at)
 
     # --- judgement ----------------------------------------------------------------
 
@@ -294,10 +300,9 @@ class Evaluator:
     # --- words --------------------------------------------------------------------
 
     def _log_speed(self, report: SafetyReport, at: Instant) -> None:
-        known = self.decisions, self.people, self.world, self.greenhouse
         unmet = self.unmet(report.robot_id)
         self._event_log.write(
-            lambda: speed_line(report, evidence_of(report, *known), unmet), at
+            lambda: speed_line(report, cause_of(report, self.decisions), unmet), at
         )
 
 

@@ -1,25 +1,22 @@
 """Evidence in words: decisions as rows; speeds, alerts and marks as log lines."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 
 from iveg.domain.alerts import BookedAlert
 from iveg.domain.decisions import Decisions, Link, Place, SlowdownDecision
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.feedback import FULL_SPEED, HALF_SPEED
-from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import SafetyReport
 from iveg.domain.parameters import for_class
 from iveg.domain.records import DecisionRecord
-from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.clear import ClearCondition
 from iveg.domain.rule.zones import Zone, ZoneEntry
 from iveg.domain.stamps import wall_of
 from iveg.domain.tracking.looks import Looks
-from iveg.domain.tracking.people import People
-from iveg.domain.tracking.person import Thing
+from iveg.domain.tracking.person import Sighting, Thing
 from iveg.domain.world import World
 
 
@@ -36,7 +33,7 @@ def record_of(decision: SlowdownDecision) -> DecisionRecord:
         observer=zone.observer,
         class_=zone.reason,
         class_id=None if sighting is None else sighting.class_id,
-        confidence=None if sighting is None or sighting.laser else sighting.confidence,
+        confidence=_confidence(sighting),
         x=zone.x,
         y=zone.y,
         z=None if sighting is None else sighting.z,
@@ -59,6 +56,11 @@ def record_of(decision: SlowdownDecision) -> DecisionRecord:
         speed_after=decision.speed_after,
         links=[write_link(link) for link in decision.links()],
     )
+
+
+def _confidence(sighting: Sighting | None) -> float | None:
+    """Confidence of a look; a laser and a peer's own pose have none."""
+    return None if sighting is None or sighting.laser else sighting.confidence
 
 
 def places_of(entry: ZoneEntry, world: World) -> Iterator[Place]:
@@ -115,114 +117,20 @@ def write_link(link: Link) -> dict[str, object]:
     }
 
 
-@dataclass(frozen=True, slots=True)
-class SlowdownCauses:
-    """The detection behind a slow-down, and its distance from the robot (m).
+def cause_of(report: SafetyReport, decisions: Decisions) -> ZoneEntry | None:
+    """The zone that a robot says it slows for, by the decision or the alert it names.
 
-    Attributes:
-        decision_id: The decision that opens; None where the robot was ahead of ours.
-        radius_m: Of the zone that it came into, where it had grown: the cause was not
-            in view for ``unseen_s`` seconds.
+    A robot judges alerts by its own pose, too.  Where it is ahead of iVeg it names the
+    alert, and there may be no decision yet.
     """
-
-    cause: str
-    class_: str
-    observer: str
-    distance_m: float
-    in_sight: bool
-    confidence: float | None = None
-    decision_id: str | None = None
-    radius_m: float | None = None
-    unseen_s: float | None = None
-
-
-def evidence_of(
-    report: SafetyReport,
-    decisions: Decisions,
-    people: People,
-    world: World,
-    greenhouse: Greenhouse,
-) -> SlowdownCauses | None:
-    """Facts behind the reason that a robot reports; None when iVeg has none.
-
-    A robot judges alerts by its own pose, too, and may be ahead of our decision; it
-    then names the alert, and that person's data are the evidence.
-    """
-    if report.reason not in ("person", "robot"):
-        return None
-    decision = decisions.get(report.decision_id or "")
+    named = report.decision_id
+    decision = decisions.get(named or "")
     if decision is not None:
-        return _of_entry(decision.entry)
-    robot = world.robots[report.robot_id]
-    found = _without_decision(report, robot, people, world, greenhouse)
-    if found is None:
-        return None
+        return decision.entry
     ours = (
-        one.decision_id
-        for one in decisions.open
-        if (one.entry.robot_id, one.entry.zone.cause) == (robot.robot_id, found.cause)
+        one.entry for one in decisions.open if one.entry.robot_id == report.robot_id
     )
-    return replace(found, decision_id=next(ours, None))
-
-
-def _without_decision(
-    report: SafetyReport,
-    robot: RobotState,
-    people: People,
-    world: World,
-    greenhouse: Greenhouse,
-) -> SlowdownCauses | None:
-    for person in people.known.values():
-        if report.decision_id == person.decision_id:
-            look = person.newest
-            sure = None if look.laser else look.confidence
-            facts = look.x, look.y, look.observer, sure
-            name, class_ = person.person_id, person.class_
-            return _seen_by(robot, greenhouse, name, class_, *facts)
-    peer = world.robots.get(report.cause or "")
-    if peer is None or peer.odometry is None:
-        return None
-    pose, name = peer.odometry.pose, peer.robot_id
-    return _seen_by(robot, greenhouse, name, "robot", pose.x, pose.y, name)
-
-
-def _of_entry(entry: ZoneEntry) -> SlowdownCauses:
-    zone, sighting = entry.zone, entry.zone.sighting
-    confidence = None
-    if sighting is not None and not sighting.laser:
-        confidence = sighting.confidence
-    unseen = None if sighting is None else sighting.age_s(entry.entered)
-    grown = unseen is not None and unseen > LIMITS.growth_grace_s
-    return SlowdownCauses(
-        zone.cause,
-        zone.reason,
-        zone.observer,
-        entry.entered_m,
-        entry.in_sight,
-        confidence,
-        entry.decision_id,
-        zone.radius_m if grown else None,
-        unseen if grown else None,
-    )
-
-
-def _seen_by(
-    robot: RobotState,
-    greenhouse: Greenhouse,
-    cause: str,
-    class_: str,
-    x: float,
-    y: float,
-    observer: str,
-    confidence: float | None = None,
-) -> SlowdownCauses | None:
-    """Distance of a cause at x, y (m) from a robot, and whether it may see it."""
-    if robot.odometry is None:
-        return None
-    pose = robot.odometry.pose
-    sees = observer == robot.robot_id or greenhouse.in_sight(pose.x, pose.y, x, y)
-    distance_m = pose.distance_to(x, y)
-    return SlowdownCauses(cause, class_, observer, distance_m, sees, confidence)
+    return next((one for one in ours if one.zone.alert_id == named), None)
 
 
 def _first_of(
@@ -237,13 +145,15 @@ def _first_of(
 
 def speed_line(
     report: SafetyReport,
-    evidence: SlowdownCauses | None,
+    entry: ZoneEntry | None,
     unmet: Iterable[ClearCondition] = (),
 ) -> LogEvent:
     """A robot applies another factor than before, and why.
 
-    ``unmet``: conditions of "clear" that do not hold; an old pose is like
-    any old data.
+    Args:
+        report: What it applies.
+        entry: The zone that it slows for, where that is known.
+        unmet: Conditions of "clear" that do not hold; an old pose is like any old data.
     """
     slots: dict[str, Slot] = {
         "robot": report.robot_id,
@@ -251,35 +161,37 @@ def speed_line(
         "reason": report.reason,
         "cause": report.cause,
     }
-    key = "log.speed_up"
-    if report.speed_factor < FULL_SPEED:
+    if report.speed_factor >= FULL_SPEED:
+        return LogEvent("speed", "log.speed_up", slots, report.robot_id)
+    lacks = _first_of(unmet, report)
+    if lacks is not None and lacks.reason != "pose":
+        slots["observer"] = lacks.robot_id
+        key = f"log.speed_down.{lacks.reason}"
+        return LogEvent("speed", key, slots, report.robot_id)
+    if entry is None or report.reason not in ("person", "robot"):
         key = f"log.speed_down.{report.reason}"
-        lacks = _first_of(unmet, report)
-        if lacks is not None and lacks.reason != "pose":
-            key = f"log.speed_down.{lacks.reason}"
-            slots["observer"] = lacks.robot_id
-        if evidence is not None:
-            if evidence.class_ == "person" and evidence.confidence is None:
-                key = "log.speed_down.walker"
-            key += "" if evidence.in_sight else "_nlos"
-            slots |= {
-                "distance": round(evidence.distance_m, 2),
-                "observer": evidence.observer,
-                "person": evidence.cause,
-                "class": evidence.class_,
-                "confidence": evidence.confidence,
-                "in_sight": evidence.in_sight,
-            }
-            if evidence.radius_m is not None and evidence.unseen_s is not None:
-                slots["radius"] = round(evidence.radius_m, 2)
-                slots["unseen"] = round(evidence.unseen_s, 1)
+        return LogEvent("speed", key, slots, report.robot_id)
+    zone, confidence = entry.zone, _confidence(entry.zone.sighting)
+    is_walker = zone.reason == "person" and confidence is None
+    key = f"log.speed_down.{'walker' if is_walker else report.reason}"
+    slots |= {
+        "distance": round(entry.entered_m, 2),
+        "observer": zone.observer,
+        "person": zone.cause,
+        "class": zone.reason,
+        "confidence": confidence,
+        "in_sight": entry.in_sight,
+    }
+    unseen_s = 0.0 if zone.sighting is None else zone.sighting.age_s(entry.entered)
+    if unseen_s > LIMITS.growth_grace_s:
+        slots |= {"radius": round(zone.radius_m, 2), "unseen": round(unseen_s, 1)}
     return LogEvent(
         "speed",
-        key,
+        key if entry.in_sight else f"{key}_nlos",
         slots,
         report.robot_id,
-        None if evidence is None else evidence.class_,
-        None if evidence is None else evidence.decision_id,
+        zone.reason,
+        entry.decision_id,
     )
 
 

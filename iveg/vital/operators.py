@@ -8,7 +8,7 @@ or until iVeg's next start, whichever is first: forgetting one protects.
 """
 
 import asyncio
-from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
@@ -17,7 +17,6 @@ from iveg.domain.detector import OutOfService
 from iveg.domain.errors import MarkRefusedError, OutdatedError, UnknownNameError
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import Instant
-from iveg.domain.parameters import CLASSES, PARAMETERS, for_class
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.person import LONGEST_S, MOST_THINGS, Thing
 from iveg.domain.words import WordAnswer
@@ -107,28 +106,9 @@ class Rules:
             await self._append(rule)
             self._evaluator.rule = rule
             self.versions.append(rule)
-        for line in _lines(before, rule):
-            self._event_log.rule(line, at)
+        facts: dict[str, Slot] = {"by": by, "version": rule.version}
+        self._event_log.rule(LogEvent("system", "log.rule_changed", facts), at)
         return rule
-
-
-def _lines(before: DetectionRule, rule: DetectionRule) -> Iterator[LogEvent]:
-    """The change, then each value of a class that is another now."""
-    facts: dict[str, Slot] = {"by": rule.author, "version": rule.version}
-    yield LogEvent("system", "log.rule_changed", facts)
-    for class_ in CLASSES:
-        earlier = for_class(before, class_)
-        for row in PARAMETERS:
-            value = for_class(rule, class_)[row.name]
-            one_for_all = row.class_key is None and class_ != CLASSES[0]
-            if value == earlier[row.name] or one_for_all:
-                continue
-            about = {
-                "parameter": row.word,
-                "class": "every" if row.class_key is None else class_,
-            }
-            values = {"from": float(earlier[row.name]), "to": float(value)}
-            yield LogEvent("system", f"log.rule.{row.unit}", {**about, **values})
 
 
 class Detectors:

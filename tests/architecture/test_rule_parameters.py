@@ -41,7 +41,6 @@ from iveg.domain.observations import Origin
 from iveg.domain.parameters import ByClass, for_class, sent_to_robots
 from iveg.models.rule import Rule
 from iveg.ngsi import codec
-from iveg.vital.operators import _lines
 from iveg.settings import Settings, describe
 from iveg.web.api.rule import RuleChange
 from iveg.web.pages.contexts import Appearance, PageFrame, Site
@@ -67,7 +66,6 @@ print(json.dumps({
     "strictest": strictest([rule, DetectionRule()], 0.0).pause_s.every,
     "audit": "class_pauses_s" in AUDITED["PUT", "/api/v1/rule"].asked,
     "evidence": for_class(rule, "person")["pause_s"],
-    "log": [one.slots.get("parameter") for one in _lines(DetectionRule(), rule)][1:],
     "feedback": codec.read_feedback(codec.write_feedback(told)).rule["pause_s"],
     "form": [one in html for one in ("rule-new-pause", "rule-new-pause-robot")],
 }))
@@ -104,7 +102,6 @@ def test_a_further_parameter_of_a_class_is_one_row_and_its_texts(copied: Path) -
         "strictest": 3.0,
         "audit": True,
         "evidence": 3.0,
-        "log": ["pause"],
         "feedback": {"person": 3.0, "robot": 2.0},
         "form": [True, True],
     }

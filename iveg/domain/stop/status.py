@@ -305,7 +305,6 @@ _PAUSE_S: Mapping[str, float] = {
     "STANDING": STANDING_RESEND_S,
 }
 """Between two sends to a robot that has it; to every other ``_pause`` by its age."""
-_EARLY_SENDS = (0.25, 0.5, 1.0)
 _EARLY_S = 1e-3
 """Clocks that tick in fractions meet a planned moment only nearly."""
 
@@ -383,9 +382,8 @@ class Sends:
 
 def _pause(age_s: float) -> float:
     """Pause after a send at this age of a STOP that the robot does not have (s)."""
-    for early in _EARLY_SENDS:
-        if age_s < early - _EARLY_S:
-            return early - age_s
+    if age_s < 0.5 - _EARLY_S:
+        return 0.25
     return 0.5 if age_s < 10.0 else 1.0
 
 

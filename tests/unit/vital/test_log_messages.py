@@ -27,14 +27,28 @@ def slows_for(desk: Desk, x: float, by: str = "AGII") -> None:
     desk.report("AGI", factor=0.5, reason="person", decision_id=person.decision_id)
 
 
-def test_a_robot_ahead_of_our_decision_is_told_with_whom_it_means() -> None:
-    desk = Desk(greenhouse=HEDGE)
+def test_a_robot_that_is_far_ahead_of_our_decision_is_told_without_its_cause() -> None:
+    desk = Desk()
 
     slows_for(desk, 4.0)
 
     key, slots = told(desk)
+    assert key == "log.speed_down.person"
+    assert "distance" not in slots
+
+
+def test_the_line_says_that_another_robot_saw_whom_this_one_cannot_see() -> None:
+    desk = Desk(greenhouse=HEDGE)
+    desk.drive("AGI", 2.0)
+    desk.look("AGII", detection("farmer", 3.5))
+    (entry,) = desk.evaluator.entries
+
+    desk.report("AGI", factor=0.5, reason="person", decision_id=entry.decision_id)
+    desk.loop.step([], desk.clock())
+
+    key, slots = told(desk)
     assert key == "log.speed_down.person_nlos"
-    assert (slots["observer"], slots["distance"]) == ("AGII", 4.0)
+    assert (slots["observer"], slots["distance"]) == ("AGII", 1.5)
 
 
 def test_a_line_of_a_robot_ahead_opens_our_decision_when_there_is_one() -> None:
@@ -52,7 +66,7 @@ def test_a_line_of_a_robot_ahead_opens_our_decision_when_there_is_one() -> None:
 def test_nobody_is_unseen_by_the_robot_that_saw_them() -> None:
     desk = Desk(greenhouse=HEDGE)
 
-    slows_for(desk, 4.0, by="AGI")
+    slows_for(desk, 1.5, by="AGI")
 
     assert told(desk)[0] == "log.speed_down.person"
 
