@@ -5,7 +5,6 @@ of it only a digest is kept.
 """
 
 import secrets
-from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
 
@@ -177,10 +176,3 @@ class Admission:
 def _refuse_name(name: str) -> None:
     if not is_name(name) or is_reserved(name):
         raise NotANameError(name)
-
-
-def has_admin(accounts: Iterable[Account], now: float) -> bool:
-    """Whether somebody can sign in as admin at this moment (Unix s)."""
-    return any(
-        one.role == "admin" and one.password and one.is_open(now) for one in accounts
-    )

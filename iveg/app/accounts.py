@@ -6,7 +6,6 @@ from contextlib import suppress
 from typing import Final
 
 from iveg.adapters.access_file import AccessFile, earlier_sessions
-from iveg.adapters.admission import Admission, has_admin
 from iveg.adapters.history.queries import earlier_access, mark_moved
 from iveg.adapters.identity_provider import IdentityProvider
 from iveg.adapters.passwords import Passwords
@@ -114,10 +113,9 @@ class Accounts:
         """
         if not self._is_copied:
             raise HopError("database", "accounts of earlier versions are not read yet")
-        now = self._clock().wall
-        if has_admin(self.people.known.values(), now):
+        if self.people.is_led():
             return None
-        admission = Admission(self.book, CONSOLE, now)
+        admission = self.people.admission(CONSOLE)
         for account in self.people.known.values():
             if name_key(account.name) == FIRST_ADMIN:
                 return admission.reset(account, SET_UP_S)[0]

@@ -8,12 +8,11 @@ from pathlib import Path
 from fastapi import FastAPI
 from fastapi.routing import iter_route_contexts
 
-from iveg.adapters import admission
 from iveg.app.dss import open_dss
 from iveg.asgi import create_app
 from iveg.domain.tracking import person
 from iveg.settings import Settings
-from iveg.web.api import account, alerts
+from iveg.web.api import alerts
 from iveg.web.security.audited import AUDITED, READING, Audited
 from iveg.web.security.requirements import declared_action
 from iveg.web.security.roles import MAY
@@ -35,8 +34,6 @@ _LIMITS = {
     f"POST {_API}/notes": f"{alerts.MOST_TEXT} characters",
     f"POST {_API}/alerts/acknowledge": f"{alerts.MOST_TOGETHER} alerts",
     f"POST {_API}/things": f"{person.MOST_THINGS}",
-    f"POST {_API}/users": f"{admission.MOST_ACCOUNTS} accounts",
-    f"POST {_API}/tokens": f"{account.MOST_TOKENS} tokens",
     f"PUT {_API}/account/password": _WRONG,
 }
 """What bounds a route beside its role; of all others the size of the body alone."""

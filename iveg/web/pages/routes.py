@@ -1,6 +1,7 @@
 """Addresses of the HTML pages and of sign-in; each page is one context to draw."""
 
 from collections.abc import Callable
+from functools import partial
 from importlib.resources import files
 from typing import Annotated, Final
 
@@ -166,14 +167,15 @@ def _add_signing(routes: APIRouter, pages: Pages) -> None:
         request: Request, body: _ByLink | _ByPassword | _ByInvitation
     ) -> Response:
         authenticator = authenticator_of(request)
+        people = authenticator.people
         match body:
             case _ByLink():
                 return authenticator.sign_in(request, body.token)
             case _ByPassword():
-                return await authenticator.sign_in_by_password(
-                    request, body.name, body.password
-                )
-        return await authenticator.accept(request, body.invitation, body.password)
+                proof = partial(people.sign_in, body.name, body.password)
+                return await authenticator.prove(request, proof, "wrong password")
+        proof = partial(people.accept, body.invitation, body.password)
+        return await authenticator.prove(request, proof, "no such invitation")
 
     # Whose session is past its age can end it, too.
     @routes.post(

@@ -35,12 +35,8 @@ class Audited:
     asked: tuple[str, ...]
     answered: tuple[str, ...]
 
-    @property
-    def is_noted(self) -> bool:
-        """Whether a change leaves its row elsewhere; here only refusals do."""
-        return self.action in _NOTED_BY_BOOK
 
-
+# Such a change leaves its row where it counts; here only refusals do.
 _NOTED_BY_BOOK: Final = frozenset(
     {
         "account_added",
@@ -184,7 +180,9 @@ class AuditRequests:
     ) -> None:
         path: str = getattr(scope.get("route"), "path", "")
         kept = AUDITED.get((scope["method"], path))
-        if kept is None or not kept.action or (kept.is_noted and status < 400):
+        if kept is None or not kept.action:
+            return
+        if kept.action in _NOTED_BY_BOOK and status < 400:
             return
         asked, answered = _named(body, kept.asked), _named(answer, kept.answered)
         details = {"status": status, **asked, **answered}

@@ -13,7 +13,6 @@ STOP outlives the session (SECURITY.md): a person who was signed in once can sti
 import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
-from functools import partial
 from urllib.parse import parse_qs, urlsplit
 
 from starlette.exceptions import HTTPException, WebSocketException
@@ -22,7 +21,7 @@ from starlette.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-from iveg.domain.accounts import DEFAULT_NAME, Account
+from iveg.domain.accounts import DEFAULT_NAME, LINK_PERSON, Account
 from iveg.domain.errors import NotAllowedError
 from iveg.vital.audit import AuditTrail
 from iveg.web.cookies import session_cookie
@@ -76,7 +75,7 @@ class Authenticator:
         self._credentials = credentials
         self.people = people
         self.attempts = Attempts(people.clock, trail)
-        self.sessions = Sessions(people.clock, people.book, credentials.link_name)
+        self.sessions = Sessions(people.clock, people.book)
 
     # --- people sign in ---------------------------------------------------------
 
@@ -103,41 +102,23 @@ class Authenticator:
         if not same_secret(token, self._credentials.link):
             self.attempts.refuse(request, "wrong token")
         self._end_before(request)
-        return self.admit(request, self.sessions.open_by_link(), response)
+        name = self._credentials.link_name
+        cookie = self.sessions.open(name, "operator", LINK_PERSON)
+        return self.admit(request, cookie, response)
 
-    async def sign_in_by_password(
-        self, request: Request, name: str, password: str
-    ) -> Response:
-        """Exchange name and password for a session cookie; raises as ``sign_in``.
-
-        A wrong name is told as a wrong password, and takes as long.
-        """
-        proof = partial(self.people.sign_in, name, password)
-        return await self._prove(request, proof, "wrong name or password")
-
-    async def accept(
-        self, request: Request, invitation: str, password: str
-    ) -> Response:
-        """Exchange an invitation for an account and its first session."""
-        proof = partial(self.people.accept, invitation, password)
-        return await self._prove(request, proof, "no such invitation")
-
-    async def change_password(
-        self, request: Request, who: Principal, old: str, new: str
-    ) -> Response:
-        """Sign somebody in anew by a new password; their other sessions end.
-
-        A wrong old one counts as a sign-in that was refused.
-        """
-        proof = partial(self.people.change_password, who, old, new)
-        return await self._prove(request, proof, "wrong password")
-
-    async def _prove(
+    async def prove(
         self,
         request: Request,
         proof: Callable[[], Awaitable[Account | None]],
         wrong: str,
     ) -> Response:
+        """Exchange a proof for a session cookie; raises as ``sign_in``.
+
+        Args:
+            request: Brings it.
+            proof: Finds the account that it proves; None where it is wrong.
+            wrong: What the log says of one that proves nothing.
+        """
         refuse_forgery(request)
         account = await self.attempts.weigh(request, proof, wrong)
         self._end_before(request)

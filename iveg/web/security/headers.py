@@ -4,7 +4,7 @@ Pure ASGI.  Notifications come hundreds of times a second and no browser reads t
 answers, so their path is recognized first and passes the size limit alone.
 """
 
-from starlette.datastructures import MutableHeaders
+from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -76,10 +76,10 @@ class BodyLimit:
         if scope["type"] != "http" or scope["method"] == "GET":
             await self._app(scope, receive, send)
             return
-        declared = _declared_length(scope)
-        if declared is None:
+        declared = Headers(scope=scope).get("content-length", "")
+        if not declared.isdecimal():
             receive = _counted(receive)
-        elif declared > MAX_BODY:
+        elif int(declared) > MAX_BODY:
             # The unread body would be taken for the next request.
             problem = Problem(413, TOO_LONG, headers={"Connection": "close"})
             await problem.response()(scope, receive, send)
@@ -99,11 +99,3 @@ def _counted(receive: Receive) -> Receive:
         return message
 
     return receive_counted
-
-
-def _declared_length(scope: Scope) -> int | None:
-    """Value of Content-Length (bytes); None when the body comes in chunks."""
-    for name, value in scope["headers"]:
-        if name == b"content-length":
-            return int(value) if value.isdigit() else None
-    return None

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-from iveg.adapters.admission import Admission, has_admin
+from iveg.adapters.admission import Admission
 from iveg.adapters.passwords import Passwords
 from iveg.domain.accounts import (
     AccessBook,
@@ -24,6 +24,7 @@ _ROLES: Final[Mapping[TokenScope, Role]] = {
     "operate": "controller",
 }
 _USED_S = 60.0
+"""The last use of a token is known to so much (s)."""
 
 
 class People:
@@ -38,7 +39,6 @@ class People:
     def __init__(self, book: AccessBook, passwords: Passwords, clock: Clock) -> None:
         self.book, self.clock = book, clock
         self._passwords = passwords
-        self._used_at = clock().mono
 
     @property
     def known(self) -> Mapping[str, Account]:
@@ -47,7 +47,11 @@ class People:
 
     def is_led(self) -> bool:
         """Whether somebody can sign in as admin."""
-        return has_admin(self.known.values(), self.clock().wall)
+        now = self.clock().wall
+        return any(
+            one.role == "admin" and one.password and one.is_open(now)
+            for one in self.known.values()
+        )
 
     def admission(self, by: Actor) -> Admission:
         """Changes accounts and tokens as somebody; each counts at once."""
@@ -118,12 +122,11 @@ class People:
 
     def program(self, token: str) -> Principal | None:
         """The program whose token this is; None: nobody's, or nobody's any more."""
-        known, now = self.book.tokens.get(digest_of(token)), self.clock()
-        if known is None or not known.is_open(now.wall):
+        known, now = self.book.tokens.get(digest_of(token)), self.clock().wall
+        if known is None or not known.is_open(now):
             return None
-        self.book.tokens[known.digest] = replace(known, used_at=now.wall)
-        if now.mono - self._used_at >= _USED_S:
-            self._used_at = now.mono
+        if known.used_at is None or abs(now - known.used_at) >= _USED_S:
+            self.book.tokens[known.digest] = replace(known, used_at=now)
             self.book.keep()
         return _principal(known)
 

@@ -14,7 +14,6 @@ from dataclasses import replace
 from typing import cast
 
 from iveg.domain.accounts import (
-    LINK_PERSON,
     OF_ACCOUNTS,
     AccessBook,
     PersonRole,
@@ -50,21 +49,16 @@ class Sessions:
     Args:
         clock: Read at each question.
         book: Where sessions are known, and the accounts that decide over them.
-        link_name: Name of whoever holds the link of the environment.
     """
 
-    def __init__(self, clock: Clock, book: AccessBook, link_name: str) -> None:
-        self._clock, self._book, self._link_name = clock, book, link_name
+    def __init__(self, clock: Clock, book: AccessBook) -> None:
+        self._clock, self._book = clock, book
         self._kept_at = 0.0
         self._remember()
 
     @property
     def _sessions(self) -> dict[bytes, Session]:
         return self._book.sessions
-
-    def open_by_link(self) -> str:
-        """Begin a session of whoever holds the link; returns its token."""
-        return self.open(self._link_name, "operator", LINK_PERSON)
 
     def open(
         self,

@@ -207,7 +207,7 @@ async def test_without_the_setting_no_token_is_accepted(clock: Clock) -> None:
 
 
 def test_use_keeps_a_session_alive_but_not_beyond_a_day(clock: Clock) -> None:
-    sessions = Sessions(clock, AccessBook(), "operator")
+    sessions = Sessions(clock, AccessBook())
     token = sessions.open("Ana", "operator")
 
     roles = []
@@ -221,7 +221,7 @@ def test_use_keeps_a_session_alive_but_not_beyond_a_day(clock: Clock) -> None:
 
 
 def test_watching_alone_does_not_keep_a_session_alive(clock: Clock) -> None:
-    sessions = Sessions(clock, AccessBook(), "operator")
+    sessions = Sessions(clock, AccessBook())
     principal = sessions.find(sessions.open("Ana", "operator"))
     assert principal is not None
 
@@ -239,7 +239,7 @@ def test_sessions_are_bounded_and_the_longest_idle_gives_way(
     clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(accounts, "MOST_SESSIONS", 2)
-    sessions = Sessions(clock, AccessBook(), "operator")
+    sessions = Sessions(clock, AccessBook())
     first, second = sessions.open("a", "viewer"), sessions.open("b", "viewer")
     clock.now += 1
     sessions.find(first)

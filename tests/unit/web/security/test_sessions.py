@@ -33,13 +33,13 @@ def start(path: Path, clock: FakeClock) -> Restart:
     """The process before writes what waits, and the next one reads it."""
     files: list[AccessFile] = []
 
-    def start(link_name: str = "operator") -> Sessions:
+    def start() -> Sessions:
         if files:
             files.pop().close()
         files.append(file := AccessFile(path))
         book = AccessBook(file.load())
         book.on_keep.append(lambda: file.save(book.picture()))
-        return Sessions(clock, book, link_name)
+        return Sessions(clock, book)
 
     return start
 
@@ -161,7 +161,7 @@ def test_sessions_of_earlier_versions_stay(tmp_path: Path, clock: FakeClock) -> 
     write_lines(before, Form("sessions"), lines)
 
     book = AccessBook(Access(sessions=earlier_sessions(before)))
-    sessions = Sessions(clock, book, "operator")
+    sessions = Sessions(clock, book)
 
     found = [sessions.find(f"token-{number}") for number in range(2)]
     assert [one and (one.name, one.role, one.method) for one in found] == [
