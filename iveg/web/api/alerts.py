@@ -5,7 +5,7 @@ into the incident packs of its moment.
 """
 
 from collections.abc import Callable, Collection
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 from fastapi import APIRouter, HTTPException, Query, Response
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -165,7 +165,12 @@ def notes_router(
 async def _is_recorded(queries: Queries, robot: str) -> bool:
     """Whether a decision, an order or an alert names a robot that left the fleet."""
     wanted = lists.Filter(robot=robot, limit=1)
-    for listed in (lists.DECISIONS, lists.COMMANDS, lists.ALERTS):
+    naming: tuple[lists.ListOf[Any], ...] = (
+        lists.DECISIONS,
+        lists.COMMANDS,
+        lists.ALERTS,
+    )
+    for listed in naming:
         if (await queries.page(listed, wanted)).items:
             return True
     return False
