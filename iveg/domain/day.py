@@ -32,12 +32,11 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class DaySighting:
-    """Position of a person in one second, and the observer."""
+    """Position of a person in one second."""
 
     second: int
     x: float
     y: float
-    observer: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,14 +46,13 @@ class Passing:
     Attributes:
         distance_m: Between the middles of both.
         speed: The robot's (m/s).
+        lane: Aisle of the person.
     """
 
     at: float
     robot_id: str
     distance_m: float
     speed: float
-    robot: tuple[float, float]
-    person: tuple[float, float]
     lane: str | None
 
 
@@ -168,8 +166,6 @@ def _passing(pose: Pose, one: DaySighting, greenhouse: Greenhouse) -> Passing:
         robot_id=pose.robot_id,
         distance_m=hypot(pose.x - one.x, pose.y - one.y),
         speed=abs(pose.speed),
-        robot=(pose.x, pose.y),
-        person=(one.x, one.y),
         lane=greenhouse.lane_at(one.x, one.y),
     )
 

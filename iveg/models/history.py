@@ -19,7 +19,6 @@ from iveg.models.base import (
     GreenhouseMap,
     Hundredth,
     Model,
-    Point,
     Position,
     Row,
     Slots,
@@ -309,14 +308,12 @@ class Encounters(Model):
 
 
 class Pass(Model):
-    """A moving robot near a person; positions are means over a second.
+    """A moving robot near a person, by means over a second.
 
     Attributes:
         at: When.
         robot_id: Who.
         speed: Of the robot (m/s).
-        robot: Where (m).
-        person: Where (m).
         lane: Aisle.
     """
 
@@ -324,8 +321,6 @@ class Pass(Model):
     robot_id: str
     distance_m: Hundredth = Field(description="Between the middles of both.")
     speed: Hundredth
-    robot: Point
-    person: Point
     lane: str | None
 
 

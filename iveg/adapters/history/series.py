@@ -195,7 +195,7 @@ def people_seen(
     c = detections.c
     second = whole(connection, c.at)
     wanted = (
-        select(second, func.avg(c.x), func.avg(c.y), c.robot_id)
+        select(second, func.avg(c.x), func.avg(c.y))
         .where(c.at >= since, c.at < until, c.confident, c.class_ == "person")
         # A place that is no longer kept is no place near a robot.
         .where(c.x.is_not(None))

@@ -165,8 +165,12 @@ def notes_router(
 async def _is_recorded(queries: Queries, robot: str) -> bool:
     """Whether a decision, an order or an alert names a robot that left the fleet."""
     wanted = lists.Filter(robot=robot, limit=1)
-    named: tuple[lists.ListOf[Any], ...] = lists.DECISIONS, lists.COMMANDS, lists.ALERTS
-    for listed in named:
+    naming: tuple[lists.ListOf[Any], ...] = (
+        lists.DECISIONS,
+        lists.COMMANDS,
+        lists.ALERTS,
+    )
+    for listed in naming:
         if (await queries.page(listed, wanted)).items:
             return True
     return False

@@ -29,7 +29,6 @@ from iveg.adapters.history.series import (
 from iveg.adapters.history.upkeep import lost_of
 from iveg.domain.alerts import MOST_KEPT
 from iveg.domain.day import (
-    Passing,
     closest_passes,
     encounter_counts,
     slowed_minutes,
@@ -41,7 +40,7 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord
 from iveg.domain.stamps import format_stamp
-from iveg.models.base import GreenhouseMap, Point, write_json
+from iveg.models.base import GreenhouseMap, write_json
 from iveg.models.command import Command
 from iveg.models.history import Day, Encounters, Pass, Slowed, Worked
 from iveg.vital.ports import Clock
@@ -228,7 +227,9 @@ async def _read(queries: Queries, greenhouse: Greenhouse, day: date, now: float)
         worked=by_name,
         slowed=by_length,
         encounters=Encounters.from_value(encounter_counts(decisions)),
-        passes=[_pass(one) for one in closest_passes(poses, seen, greenhouse)],
+        passes=[
+            Pass.from_value(one) for one in closest_passes(poses, seen, greenhouse)
+        ],
         stops=[Command.from_record(one) for one in stops],
         unseen=len(await queries.unseen_alerts(MOST_KEPT)),
         lost=list(await queries.ask(lost_of, since, until)),
@@ -247,14 +248,6 @@ async def _decisions(
         if len(found) >= _MOST_DECISIONS:
             break
     return found
-
-
-def _pass(one: Passing) -> Pass:
-    return Pass.from_value(one, robot=_point(one.robot), person=_point(one.person))
-
-
-def _point(place: tuple[float, float]) -> Point:
-    return Point(x=round(place[0], 2), y=round(place[1], 2))
 
 
 def router(read: ReadDay, pages: Pages, clock: Clock) -> APIRouter:

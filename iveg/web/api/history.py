@@ -14,7 +14,7 @@ from fastapi.responses import StreamingResponse
 
 from iveg.adapters import clock
 from iveg.adapters.history import lists
-from iveg.adapters.history.lists import Cursor, Filter, ListOf, Page
+from iveg.adapters.history.lists import Cursor, ListOf, Page
 from iveg.adapters.history.queries import Queries
 from iveg.domain.errors import HopError
 from iveg.domain.fleet import NOBODY, FleetDescription
@@ -36,7 +36,7 @@ from iveg.web.api import day, exports
 from iveg.web.api.answers import Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
 from iveg.web.api.history_filters import Filters, filter_of
-from iveg.web.pages.sentences import Sentences, in_madrid, read_sentences
+from iveg.web.pages.sentences import Sentences, read_sentences
 from iveg.web.security.requirements import refusals, require
 from iveg.web.security.roles import Action
 
@@ -222,8 +222,7 @@ def _add_list(
             page = replace(page, next=None)
         pages = queries.pages(one.source, page, wanted)
         body = file_parts(one, pages, form, worker.run, filters.language)
-        day_of = _day(wanted) if filters.language else ""
-        attached = f'attachment; filename="{one.path}{day_of}.{form}"'
+        attached = f'attachment; filename="{one.path}.{form}"'
         return StreamingResponse(
             body, 200, {"Content-Disposition": attached}, MEDIA_TYPES[form]
         )
@@ -279,9 +278,3 @@ def _csv_page(
 @cache
 def _reader(language: str | None) -> Sentences | None:
     return None if language is None else read_sentences(language)
-
-
-def _day(wanted: Filter) -> str:
-    """The first day that was asked for, for the name of the file."""
-    at = clock.wall() if wanted.since is None else wanted.since
-    return f"-{in_madrid(at):%Y-%m-%d}"

@@ -1,12 +1,12 @@
 """The paper's latency table, live, beside its own numbers (docs/interfaces/http.md).
 
-It is read in the loop from streams of measures, and written in the worker.
+It is read in the loop from streams of measures; its figure is drawn in the worker.
 """
 
 import asyncio
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Annotated, Any
+from typing import Annotated
 
 import orjson
 from fastapi import APIRouter, Query, Response
@@ -25,9 +25,7 @@ from iveg.domain.latency import (
     collect,
     merge,
 )
-from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
-from iveg.models.base import write_json
 from iveg.models.health import (
     LatencyClock,
     LatencyRow,
@@ -36,7 +34,7 @@ from iveg.models.health import (
     in_ms,
 )
 from iveg.vital.ports import Clock
-from iveg.web.api.answers import Apart
+from iveg.web.api.answers import Apart, Json
 from iveg.web.pages.charts import cdf_figure
 from iveg.web.security.requirements import READERS, refusals
 
@@ -51,41 +49,6 @@ class Asked(BaseModel):
         None, pattern=r"^[A-Za-z0-9-]{1,64}$", description="Robot id; all unless told"
     )
     figures: bool = Field(True, description="Whether to draw the distributions, too")
-
-
-def members_of(watch: LatencyWatch, asked: Asked, now: Instant) -> dict[str, object]:
-    """Values read from the watch, in the loop's thread."""
-    return {
-        "at": format_stamp(now.wall),
-        "window": asked.window,
-        "robot": asked.robot,
-        "paper": {
-            place: {data: asdict(row) for data, row in rows.items()}
-            for place, rows in PAPER.items()
-        },
-        "clocks": [
-            _clock(robot_id, one)
-            for robot_id, one in watch.clocks.items()
-            if asked.robot in (None, robot_id)
-        ],
-    }
-
-
-def write_table(
-    sketches: Mapping[Cell, Sketch], members: dict[str, Any], asked: Asked
-) -> bytes:
-    """The whole answer; in the worker."""
-    figures: dict[str, object] = {}
-    if asked.figures:
-        figures["cdf"] = orjson.Fragment(cdf_figure(sketches))
-    answer = LatencyTable(
-        **members,
-        direct=any(sketches[data, "uplink"].count for data in DATA),
-        rows=[_row(data, sketches) for data in DATA],
-        figures=figures,
-    )
-    # Member by member, as only orjson knows what to do with a figure that is drawn.
-    return write_json(vars(answer))
 
 
 def _row(data: Data, sketches: Mapping[Cell, Sketch]) -> LatencyRow:
@@ -125,12 +88,32 @@ def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
     @routes.get("/latency", response_model=LatencyTable)
     async def latency(asked: Annotated[Asked, Query()]) -> Response:
         """Mean and quantiles of each hop, clocks, and the figure."""
+        now = clock()
         parts = collect(watch.streams, asked.window, asked.robot)
-        members = members_of(watch, asked, clock())
-        # A day of twenty robots is merged in a thread, as sending all of it to the
-        # worker costs more; the figure of the sums is drawn there.
+        # A day of ten robots is merged in a thread, as sending all of it to the worker
+        # costs more; the figure of the sums is drawn there.
         sketches = await asyncio.to_thread(merge, parts)
-        body = await worker.run(write_table, sketches, members, asked)
-        return Response(body, media_type="application/json")
+        figures: dict[str, object] = {}
+        if asked.figures:
+            figures["cdf"] = orjson.Fragment(await worker.run(cdf_figure, sketches))
+        answer = LatencyTable(
+            at=format_stamp(now.wall),
+            window=asked.window,
+            robot=asked.robot,
+            direct=any(sketches[data, "uplink"].count for data in DATA),
+            rows=[_row(data, sketches) for data in DATA],
+            paper={
+                place: {data: asdict(row) for data, row in rows.items()}
+                for place, rows in PAPER.items()
+            },
+            clocks=[
+                _clock(robot_id, one)
+                for robot_id, one in watch.clocks.items()
+                if asked.robot in (None, robot_id)
+            ],
+            figures=figures,
+        )
+        # Member by member, as only orjson knows what to do with a figure that is drawn.
+        return Json(vars(answer))
 
     return routes

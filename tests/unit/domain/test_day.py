@@ -73,7 +73,7 @@ def test_encounters_are_those_with_people_and_say_how_they_went() -> None:
 
 def test_the_closest_passes_are_of_moving_robots_and_not_one_pass_told_thrice() -> None:
     poses = [pose(10), pose(11, x=1.5), pose(200, x=4.0), pose(400, speed=0.0)]
-    seen = [DaySighting(second, 2.0, 2.0, "AGII") for second in (10, 11, 200, 400)]
+    seen = [DaySighting(second, 2.0, 2.0) for second in (10, 11, 200, 400)]
 
     found = closest_passes(poses, seen, GREENHOUSE)
 

@@ -116,4 +116,3 @@ async def test_28_6_the_sheet_begins_with_the_day_in_a_sentence_and_on_a_plan(
     # The lane lies along the house, 20 m of it: 2 of 2 minutes, and 1.5 of 2.
     bars = re.findall(r'sheet__(\w+)" x="0.0" y="[\d.]+" width="([\d.]+)"', plan)
     assert bars == [("worked", "20.0"), ("slowed", "15.0")]
-    assert re.search(r'cx="6.0" cy="18.0".*?>1</text>', plan, re.DOTALL)
