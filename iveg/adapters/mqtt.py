@@ -23,7 +23,7 @@ from iveg.domain.errors import HopError
 
 # --- certificates -----------------------------------------------------------------
 #
-# TLS to the broker: whom to trust, and the certificate by which a program is known.
+# TLS to the broker: trusted authorities, and the certificate that names a program.
 #
 # The files are read at each connection.
 
@@ -42,7 +42,7 @@ class TlsFiles:
     key: str = ""
 
     def context(self) -> ssl.SSLContext:
-        """What a connection needs, as the files are now.
+        """Context of a connection, from the files as they are now.
 
         Raises:
             OSError: a file is missing or is no certificate (``ssl.SSLError``).
@@ -88,7 +88,7 @@ class BrokerAddress:
         )
 
     def context(self) -> ssl.SSLContext | None:
-        """What TLS needs, from the files as they are now; None without TLS.
+        """Context of TLS, from the files as they are now; None without TLS.
 
         Raises:
             OSError: a file is missing or is no certificate.

@@ -36,6 +36,7 @@ from iveg.domain.parameters import PARAMETERS, Class, by_names
 from iveg.domain.rule.trial import Difference, Trial
 from iveg.domain.stamps import format_stamp
 from iveg.models.rule import parameter_fields
+from iveg.ngsi.codec.fields import first_complaint
 
 _log = logging.getLogger(__name__)
 FORM = Form("rules")
@@ -100,7 +101,7 @@ class FileRules:
             try:
                 rules.append(StoredRule.model_validate_json(line).rule())
             except ValidationError as error:
-                damage = damage or f"line {number}: {_first(error)}"
+                damage = damage or f"line {number}: {first_complaint(error)}"
         return rules, damage
 
     def _write(self, versions: list[DetectionRule]) -> None:
@@ -178,13 +179,6 @@ else:
         __base__=_StoredRule,
         **parameter_fields(lambda row: row.name, "default"),
     )
-
-
-def _first(error: ValidationError) -> str:
-    """The first complaint, in a few words."""
-    complaint = error.errors(include_url=False)[0]
-    place = ".".join(str(part) for part in complaint["loc"])
-    return f"{place}: {complaint['msg']}" if place else complaint["msg"]
 
 
 def rule_fields(rule: DetectionRule) -> dict[str, object]:
