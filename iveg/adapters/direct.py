@@ -32,7 +32,7 @@ def _read_in(scope: Scope) -> tuple[Kind, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _Source:
-    """What comes on one topic.
+    """Topic of a robot, and the reader of its messages.
 
     Attributes:
         read: Reads a payload.

@@ -42,7 +42,7 @@ TokenHeader = Literal["Authorization", "X-Auth-Token"]
 
 @dataclass(frozen=True, slots=True)
 class TokenGrant:
-    """How a token is asked for.
+    """Request for a token.
 
     Attributes:
         url: Of the token endpoint.
@@ -63,7 +63,7 @@ class TokenGrant:
 
     @property
     def form(self) -> dict[str, str]:
-        """What is posted (RFC 6749, 4.3.2 and 4.4.2)."""
+        """Form to post (RFC 6749, 4.3.2 and 4.4.2)."""
         asked = {"grant_type": "client_credentials"}
         if self.user:
             asked = {
@@ -87,7 +87,7 @@ class FiwareToken(httpx.Auth):
     """Gets the token, keeps it new, and sends requests with it.
 
     Args:
-        grant: How it is asked for.
+        grant: The request for it.
         mono: The monotonic clock (s).
         http: Asks the endpoint.
     """

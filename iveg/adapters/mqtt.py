@@ -12,7 +12,6 @@ import math
 import random
 import socket
 import ssl
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
@@ -24,7 +23,7 @@ from iveg.domain.errors import HopError
 
 # --- certificates -----------------------------------------------------------------
 #
-# TLS to the broker: whom to trust, and the certificate by which a program is known.
+# TLS to the broker: trusted authorities, and the certificate that names a program.
 #
 # The files are read at each connection.
 
@@ -43,7 +42,7 @@ class TlsFiles:
     key: str = ""
 
     def context(self) -> ssl.SSLContext:
-        """What a connection needs, as the files are now.
+        """Context of a connection, from the files as they are now.
 
         Raises:
             OSError: a file is missing or is no certificate (``ssl.SSLError``).
@@ -89,7 +88,7 @@ class BrokerAddress:
         )
 
     def context(self) -> ssl.SSLContext | None:
-        """What TLS needs, from the files as they are now; None without TLS.
+        """Context of TLS, from the files as they are now; None without TLS.
 
         Raises:
             OSError: a file is missing or is no certificate.
@@ -103,8 +102,6 @@ _log = logging.getLogger(__name__)
 # aiomqtt's own: it complains of every message that waits for its confirmation.
 logging.getLogger("mqtt").setLevel(logging.ERROR)
 NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
-MOST_EARLY = 2000
-"""Messages at QoS 1 that wait until all subscriptions stand; the oldest give way."""
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.2, 2.0
 _KEEPALIVE_S = 5
 _ANSWERED_WITHIN_S, _CONFIRMED_WITHIN_S = 5.0, 1.5
@@ -132,8 +129,6 @@ class MqttLink:
         self.attach(subscriptions or {}, on_message)
         self._client: aiomqtt.Client | None = None
         self._offered: dict[str, tuple[bytes, int]] = {}
-        self._early: deque[aiomqtt.Message] = deque(maxlen=MOST_EARLY)
-        """Came before all subscriptions were in place, when nothing can be answered."""
         self._wake, self._drained = asyncio.Event(), asyncio.Event()
         self._drained.set()
         self._loss_told = False
@@ -204,7 +199,6 @@ class MqttLink:
         ends = list[asyncio.Future[None]]()
         try:
             async with AsyncExitStack() as connections:
-                self._early.clear()
                 for subscriptions in self._subscriptions:
                     client = await connections.enter_async_context(self._new_client())
                     ends.append(asyncio.ensure_future(_end_of(client)))
@@ -228,8 +222,6 @@ class MqttLink:
             self._send_offered(client), name=f"mqtt-send-{self._name}"
         )
         try:
-            while self._early:
-                self._hand_over(self._early.popleft())
             done, _ = await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
             done.pop().result()
         finally:
@@ -246,17 +238,10 @@ class MqttLink:
             timeout=_ANSWERED_WITHIN_S,
             tls_context=address.context(),
             socket_options=NODELAY,
-            queue_type=_handing_to(self._take),
+            queue_type=_handing_to(self._hand_over),
             # A STOP never waits until the broker has confirmed telemetry.
             max_inflight_messages=0,
         )
-
-    def _take(self, message: aiomqtt.Message) -> None:
-        """Hand on what was read, or keep it until all subscriptions stand."""
-        if message.qos and self._client is None:
-            self._early.append(message)
-        else:
-            self._hand_over(message)
 
     def _hand_over(self, message: aiomqtt.Message) -> None:
         """A mistake of ours in here must end ``run``, and not the connection alone."""

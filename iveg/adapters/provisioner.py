@@ -140,7 +140,7 @@ class Provisioner:
             if isinstance(observation, HeartbeatProbe):
                 monitor.stored(observation.origin)
         if monitor.orion_error:
-            monitor.orion_error, monitor.orion_back_at = "", at.mono
+            monitor.orion_error = ""
             self._gap.set()
         return self._tell("orion", None)
 

@@ -32,6 +32,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.parameters import PARAMETERS, Class, by_names
 from iveg.domain.stamps import format_stamp
 from iveg.models.rule import parameter_fields
+from iveg.ngsi.codec.fields import first_complaint
 
 _log = logging.getLogger(__name__)
 FORM = Form("rules")
@@ -96,7 +97,7 @@ class FileRules:
             try:
                 rules.append(StoredRule.model_validate_json(line).rule())
             except ValidationError as error:
-                damage = damage or f"line {number}: {_first(error)}"
+                damage = damage or f"line {number}: {first_complaint(error)}"
         return rules, damage
 
     def _write(self, versions: list[DetectionRule]) -> None:
@@ -174,13 +175,6 @@ else:
         __base__=_StoredRule,
         **parameter_fields(lambda row: row.name, "default"),
     )
-
-
-def _first(error: ValidationError) -> str:
-    """The first complaint, in a few words."""
-    complaint = error.errors(include_url=False)[0]
-    place = ".".join(str(part) for part in complaint["loc"])
-    return f"{place}: {complaint['msg']}" if place else complaint["msg"]
 
 
 def rule_fields(rule: DetectionRule) -> dict[str, object]:

@@ -50,7 +50,7 @@ class Low:
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """What is shown and kept of a small sensor, whose value is one flat object.
+    """Display and storage of a small sensor, whose value is one flat object.
 
     Attributes:
         shown: Name of the quantity on the card (``robot.{name}_level``; while a flag

@@ -111,7 +111,7 @@ UNKNOWN_ORIGIN = Origin()
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """What somebody observed.
+    """Something that a robot or a device observed.
 
     Attributes:
         robot_id: Who says so; empty: no robot.

@@ -130,7 +130,7 @@ def lag_in_words(lag_s: float, *, growing: bool = False) -> str:
 
 
 def stopped_in_words(lag_s: float | None) -> str:
-    """That nothing passes, and for how long by now where a probe tells (s)."""
+    """Sentence that nothing passes, and for how long where a probe tells (s)."""
     for_s = "" if lag_s is None else f", for {lag_s:.0f} s by now"
     return f"measures do not reach Orion{for_s}"
 

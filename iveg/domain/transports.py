@@ -35,7 +35,7 @@ class Transport:
         return self.can_stop if order == "stop" else self.can_release
 
     def switched(self, *, on: bool) -> "Transport":
-        """The same transport, or one that carries no order."""
+        """This transport, or one like it that carries no order."""
         return self if on else replace(self, can_stop=False, can_release=False)
 
 

@@ -61,8 +61,6 @@ class HealthMonitor:
         mqtt_error: Why the broker did not confirm the last probe.
         orion_error: What the last question to Orion came to; empty when well.
         orion_slow: That it answers, and how late.
-        orion_back_at: When it answered again after an outage (s, monotonic): earlier
-            notifications do not prove that it still has its subscriptions.
         agent_error: The same of the IoT Agent; ``agent_slow`` too.
         agent_silent: That the agent takes questions and does not answer them.
         agent_warning: What a person should look at though all seems well.
@@ -79,11 +77,9 @@ class HealthMonitor:
         self._start = start
         self._database = database
         self.mqtt_connected = False
-        self._was_connected = False
         self.mqtt_error = ""
         self.orion_error = self.orion_slow = ""
         self.orion_ok_at: float | None = None
-        self.orion_back_at = float("-inf")
         self.agent_error = self.agent_silent = ""
         self.agent_slow = self.agent_warning = ""
         self.notify_error = self.notify_detail = ""
@@ -148,10 +144,9 @@ class HealthMonitor:
 
     def _mqtt(self, now: Instant) -> HopHealth:
         if self.mqtt_connected:
-            self._was_connected = True
             state: HopState = "down" if self.mqtt_error else "ok"
             return HopHealth(Hop.MQTT, state, detail=self.mqtt_error)
-        if not self._was_connected and self._starting(now):
+        if self._starting(now):
             return HopHealth(Hop.MQTT, "unknown")
         return HopHealth(Hop.MQTT, "down", detail="not connected")
 
@@ -232,8 +227,6 @@ class HealthMonitor:
         age = _age(self.notified_at, now)
         state = self._by_age(age, now)
         if state == "ok":
-            if (self.notified_at or 0.0) < self.orion_back_at:
-                return HopHealth(Hop.NOTIFICATIONS, "unknown", age)
             missed: HopState = "down" if self.notify_error else "ok"
             return HopHealth(Hop.NOTIFICATIONS, missed, age, self.notify_error)
         if blind:

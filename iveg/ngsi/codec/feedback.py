@@ -1,4 +1,4 @@
-"""What iVeg tells robots, both ways: feedback, and scans of their peers."""
+"""Messages of iVeg to robots, both ways: feedback, and scans of their peers."""
 
 from collections.abc import Mapping
 from dataclasses import replace

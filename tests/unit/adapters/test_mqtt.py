@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Callable
 import orjson
 import pytest
 
-from iveg.adapters.mqtt import MOST_EARLY, BrokerAddress, MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.transports import MqttTransport
 from iveg.domain.errors import HopError
 from iveg.domain.feedback import Feedback
@@ -225,64 +225,6 @@ async def test_f1_a_broker_that_goes_and_comes_back_is_found_again(
                 await until(lambda: heard.messages)
                 assert (heard.connects, heard.losses) == (2, 1)
                 assert len(losses_told(caplog)) == 1
-
-
-# --- what a broker says while the subscriptions are made --------------------------
-
-
-@contextlib.asynccontextmanager
-async def broker_that_says(early: bytes) -> AsyncIterator[tuple[int, bytearray]]:
-    """Messages before SUBACK: the broker's port, and what it hears from then on."""
-    heard = bytearray()
-
-    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        await reader.read(1000)
-        writer.write(CONNACK)
-        subscribe = await reader.read(1000)
-        writer.write(early)
-        while more := await reader.read(100_000):
-            if not heard:
-                writer.write(b"\x90\x03" + subscribe[2:4] + b"\x01")
-            heard.extend(more)
-        writer.close()
-
-    async with await asyncio.start_server(serve, "127.0.0.1", 0) as server:
-        yield server.sockets[0].getsockname()[1], heard
-
-
-def at_qos_1(payload: bytes) -> bytes:
-    """A PUBLISH on topic ``t`` with packet identifier 7."""
-    body = b"\x00\x01t\x00\x07" + payload
-    return b"\x32" + bytes((len(body),)) + body
-
-
-async def test_of_what_came_before_the_subscriptions_stood_the_newest_are_kept() -> (
-    None
-):
-    early = b"".join(at_qos_1(b"%d" % number) for number in range(MOST_EARLY + 500))
-    async with broker_that_says(early) as (port, _):
-        heard = Heard(port, "t")
-        async with running(heard.link):
-            await until(lambda: heard.messages)
-
-    kept = [int(payload) for _, payload in heard.messages]
-    assert kept[:MOST_EARLY] == [*range(500, MOST_EARLY + 500)]
-
-
-async def test_a_message_before_the_subscriptions_is_acknowledged_and_waits() -> None:
-    connected: list[bool] = []
-    async with broker_that_says(at_qos_1(b"order")) as (port, said):
-        link = MqttLink(
-            BrokerAddress("127.0.0.1", port),
-            "test",
-            {"t": 1},
-            lambda *_: connected.append(link.connected),
-        )
-        async with running(link):
-            await until(lambda: connected)
-
-    assert said.startswith(b"\x40\x02\x00\x07")
-    assert connected == [True]
 
 
 @pytest.mark.parametrize("qos", [0, 1])

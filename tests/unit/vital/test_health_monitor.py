@@ -183,14 +183,3 @@ def test_a_device_that_may_swallow_commands_is_shown_though_measures_pass() -> N
 
     assert hop(monitor, "iot_agent", 10.0).detail == monitor.agent_warning
     assert not monitor.whole(at(10.0))
-
-
-def test_what_orion_sent_before_an_outage_says_nothing_of_its_subscriptions() -> None:
-    monitor = healthy(10.0)
-
-    monitor.orion_back_at = at(11.0).mono
-    before = states(monitor, 12.0)["notifications"]
-    monitor.notified_at = at(11.5).mono
-
-    assert before == "unknown"
-    assert states(monitor, 12.0)["notifications"] == "ok"
