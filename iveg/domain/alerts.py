@@ -227,6 +227,8 @@ def of_detector(
 ) -> Iterable[Condition]:
     """A detector whose pictures are not read whole; ``started``: when iVeg did."""
     name, detector = robot.robot_id, robot.detector
+    if _is_recent(detector.flawed_at.get("overload"), now):
+        yield Condition.of_robot("P2", "alert.pictures_not_judged", name)
     if not robot.description.has_detector:
         return
     if _is_recent(detector.flawed_at.get("unreadable"), now) or _is_unplaced(
@@ -324,19 +326,6 @@ def _may_be_late_s(robot: RobotState, now: Instant) -> float:
     return inf if age is None else age
 
 
-def of_overload(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:
-    """Detectors with more detections than can be judged: one alert names them all."""
-    yield from _of_all(
-        "P2",
-        "alert.pictures_not_judged",
-        (
-            one.robot_id
-            for one in robots
-            if _is_recent(one.detector.flawed_at.get("overload"), now)
-        ),
-    )
-
-
 def of_rule(rule: DetectionRule) -> Iterable[Condition]:
     """The rule in force was made from a damaged file, and nobody has looked at it."""
     if rule.author == RECOVERED:
@@ -344,29 +333,15 @@ def of_rule(rule: DetectionRule) -> Iterable[Condition]:
         yield Condition("P2", "alert.rule_recovered", "fleet", None, slots)
 
 
-def of_fleet(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:
-    """Estimated ages, no description, boxes without a frame: one alert each."""
-    names: dict[str, list[str]] = {
-        "alert.age_estimated": [],
-        "alert.robots_not_described": [],
-        "alert.frame_not_named": [],
-    }
-    for robot in robots:
-        since = robot.estimated_since
-        if since is not None and now.mono - since > ESTIMATED_SHOWN_AFTER_S:
-            names["alert.age_estimated"].append(robot.robot_id)
-        if not robot.description.is_described:
-            names["alert.robots_not_described"].append(robot.robot_id)
-        if robot.unlabelled and robot.profile.unlabelled_frame is None:
-            names["alert.frame_not_named"].append(robot.robot_id)
-    for key, found in names.items():
-        yield from _of_all("P3", key, found)
-
-
-def _of_all(priority: Priority, key: str, names: Iterable[str]) -> Iterable[Condition]:
-    """One condition that names every robot concerned; none without robots."""
-    if robots := ", ".join(sorted(names)):
-        yield Condition(priority, key, "fleet", None, {"robots": robots})
+def of_description(robot: RobotState, now: Instant) -> Iterable[Condition]:
+    """Facts that a robot or the fleet file leaves out."""
+    name, since = robot.robot_id, robot.estimated_since
+    if since is not None and now.mono - since > ESTIMATED_SHOWN_AFTER_S:
+        yield Condition.of_robot("P3", "alert.age_estimated", name)
+    if not robot.description.is_described:
+        yield Condition.of_robot("P3", "alert.robots_not_described", name)
+    if robot.unlabelled and robot.profile.unlabelled_frame is None:
+        yield Condition.of_robot("P3", "alert.frame_not_named", name)
 
 
 def write_alert(alert: BookedAlert) -> AlertRecord:

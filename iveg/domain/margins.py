@@ -38,11 +38,8 @@ class SafetyMargin:
 
     Attributes:
         gap_m: Centre distance less both footprints.
-        walks_m: How far the person may walk until the robot stands.
-        reaction_m: How far the robot drives before its brakes act.
-        braking_m: How far it drives after.
+        needs_m: S_p.
         age_s: Of the older of both positions (s).
-        braking: What the margin counts on (m/s²).
         known: False where the robot's pose is too old, or the look is and the person
             could be near by now.
     """
@@ -50,17 +47,9 @@ class SafetyMargin:
     robot_id: str
     person_id: str
     gap_m: float
-    walks_m: float
-    reaction_m: float
-    braking_m: float
+    needs_m: float
     age_s: float
-    braking: float
     known: bool = True
-
-    @property
-    def needs_m(self) -> float:
-        """S_p (m)."""
-        return self.walks_m + self.reaction_m + self.braking_m + LIMITS.uncertainty_m
 
     @property
     def margin_m(self) -> float:
@@ -120,16 +109,16 @@ class LeastMargins:
         reacts_s = np.maximum(LIMITS.reaction_s, age + LIMITS.onward_s)
         gap = np.hypot(x - to_x, y - to_y) - half - LIMITS.person_radius_m
         walks = LIMITS.walking_m_s * (reacts_s + speed / brakes)
-        reaction = speed * reacts_s
-        braking = np.broadcast_to(speed * speed / (2 * brakes), gap.shape)
-        margin = gap - (walks + reaction + braking + LIMITS.uncertainty_m)
+        drives = speed * reacts_s + speed * speed / (2 * brakes)
+        needs = walks + drives + LIMITS.uncertainty_m
+        margin = gap - needs
         # Of a far person the least possible margin is known, however old the look.
         is_far = margin >= LIMITS.margin_clear_m
         is_seen = look_age <= LIMITS.pose_lost_s
         self._known = (pose_age <= LIMITS.pose_lost_s) & (is_seen | is_far)
         is_inside = self._known & (margin < 0.0)
         self._rank = margin - _UNKNOWN_M * ~self._known - _INSIDE_M * is_inside
-        self._terms = gap, walks, reaction, braking, age
+        self._terms = gap, needs, age
 
     def of_robot(self, robot_id: str) -> SafetyMargin | None:
         """The least margin of this robot to anybody."""
@@ -149,19 +138,13 @@ class LeastMargins:
             return None
         place = int(self._rank[np.ix_(rows, columns)].argmin())
         row, column = rows[place // len(columns)], columns[place % len(columns)]
-        gap, walks, reaction, braking, age = (
-            term.item(row, column) for term in self._terms
-        )
-        robot = self._robots[row]
+        gap, needs, age = (term.item(row, column) for term in self._terms)
         return SafetyMargin(
-            robot.robot_id,
+            self._robots[row].robot_id,
             self._persons[column],
             gap,
-            walks,
-            reaction,
-            braking,
+            needs,
             age,
-            robot.profile.assumed_braking,
             self._known.item(row, column),
         )
 

@@ -6,7 +6,6 @@ from pydantic import Field, create_model
 
 from iveg.domain import goals, margins, situation
 from iveg.domain.kinds import SENSED, Kind
-from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Observation
 from iveg.domain.quantities import quantities_of, value_of
 from iveg.domain.robot_state import Link, RobotState
@@ -95,22 +94,6 @@ def newest_reading(robot: RobotState, kind: Kind, now: Instant) -> SensorReading
     return READINGS[kind.name](**value_of(read.observation), age_s=age_s)
 
 
-class MarginParts(Model):
-    """Terms of the protective distance (m).
-
-    Attributes:
-        person_walks_m: While the robot reacts and brakes (m).
-        reaction_m: Driven before braking (m).
-        braking_m: Driven while braking (m).
-        uncertainty_m: Of detection and pose (m).
-    """
-
-    person_walks_m: Hundredth
-    reaction_m: Hundredth
-    braking_m: Hundredth
-    uncertainty_m: float = LIMITS.uncertainty_m
-
-
 class Margin(Model):
     """The gap to a person less what stopping takes; shown, never acted on.
 
@@ -128,7 +111,6 @@ class Margin(Model):
         margin_m: Gap less S_p (m).
         band: ``clear`` from 1 m, ``tight`` from 0, ``inside`` below 0; ``unknown``, see
             below.
-        parts: S_p term by term (m).
     """
 
     robot_id: str
@@ -137,20 +119,12 @@ class Margin(Model):
     needs_m: Hundredth
     margin_m: Hundredth
     band: margins.Band
-    parts: MarginParts
     age_s: Thousandth = Field(description="Age of the older position.")
-    braking: float = Field(description="Counted on (m/s²).")
-    walking_speed: float = Field(
-        default=LIMITS.walking_m_s, description="Counted on (m/s)."
-    )
 
     @classmethod
     def of(cls, margin: margins.SafetyMargin | None) -> Self | None:
         """Margin between a robot and a person; None where there is no pair."""
-        if margin is None:
-            return None
-        parts = MarginParts.from_value(margin, person_walks_m=margin.walks_m)
-        return cls.from_value(margin, parts=parts)
+        return None if margin is None else cls.from_value(margin)
 
 
 class Situation(Model):

@@ -553,21 +553,8 @@ export type Margin = {
   needs_m: number;
   margin_m: number;
   band: "clear" | "tight" | "inside" | "unknown";
-  parts: MarginParts;
   /** Age of the older position. */
   age_s: number;
-  /** Counted on (m/s²). */
-  braking: number;
-  /** Counted on (m/s). */
-  walking_speed: number;
-};
-
-/** Terms of the protective distance (m). */
-export type MarginParts = {
-  person_walks_m: number;
-  reaction_m: number;
-  braking_m: number;
-  uncertainty_m: number;
 };
 
 /** One thing without which a robot is not clear (docs/safety.md, "Clear"). */

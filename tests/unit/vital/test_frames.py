@@ -37,7 +37,7 @@ async def test_a_robot_that_names_no_frame_is_a_notice_as_long_as_it_names_none(
         for one in desk.evaluator.alerts.waiting
         if one.condition.key == ALERT
     )
-    assert (told.priority, told.slots) == ("P3", {"robots": "AGI"})
+    assert (told.priority, told.slots) == ("P3", {"robot": "AGI"})
     desk.look("AGI")
     await desk.wait(0.1)
     assert ALERT in conditions_of(desk)

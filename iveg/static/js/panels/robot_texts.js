@@ -64,7 +64,7 @@ export function marginPartsSaid(robot, i18n) {
   const margin = robot?.margin;
   if (!margin) return "";
   const key = isAtRest(robot) ? "robot.margin_parts_stands" : "robot.margin_parts";
-  return i18n.t(key, { ...margin, ...margin.parts });
+  return i18n.t(key, { ...margin });
 }
 
 /** A task in the reader's language; a task that iVeg does not know, as it was sent.
