@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from iveg.domain.fleet import RobotProfile
-from iveg.domain.geometry import Pose2D, Rectangle
+from iveg.domain.geometry import Pose2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import DetectionFrame, Instant
@@ -35,8 +35,6 @@ _EDGE_RAD = math.radians(5.0)
 _NEAR_M, _RANGE_SHARE = 1.0, 0.75
 _FRESH_S = 0.5
 """A frame that took longer, or came so long after the one before, proves nothing."""
-_BODY_M = 0.3
-"""Half of a person, whose middle keeps so far from what stands there."""
 
 _Place = tuple[float, float]
 _NONE = np.empty(0, np.intp)
@@ -173,14 +171,12 @@ class _Watch:
 
     Attributes:
         sighting: That made it.
-        places: Where to look for who was seen there.
         since: When the first of the frames in a row came that show nobody; ``newest``
             (monotonic, s).
         frames: How many they are.
     """
 
     sighting: Sighting
-    places: Sequence[_Place]
     since: float = 0.0
     newest: float = 0.0
     frames: int = 0
@@ -214,7 +210,7 @@ class OwnSight:
         for person, sighting in _own_zones(people, look):
             watch = before.get(sighting.chain)
             if watch is None or watch.sighting.at != sighting.at:
-                watch = _Watch(sighting, self._places_of(sighting, look))
+                watch = _Watch(sighting)
             watch = self._looked(watch, person, look)
             watched[sighting.chain] = watch
             if watch.is_over:
@@ -223,22 +219,17 @@ class OwnSight:
         return [people.drop_sighting(*one) for one in ended]
 
     def _looked(self, watch: _Watch, person: TrackedPerson, look: Look) -> _Watch:
-        sighting, greenhouse = watch.sighting, self._greenhouse
+        sighting = watch.sighting
+        place = sighting.x, sighting.y
         is_empty = (
             sighting.age_s(look.at) > LIMITS.seen_s
             and look.robot.detector.blind_by is None
-            and not look.shows(person, sighting.x, sighting.y)
-            and look.in_view(watch.places, greenhouse).size == len(watch.places)
+            and not look.shows(person, *place)
+            and look.in_view([place], self._greenhouse).size == 1
         )
         if is_empty:
             return watch.going_on(look.at.mono)
         return replace(watch, frames=0) if watch.frames else watch
-
-    def _places_of(self, sighting: Sighting, look: Look) -> Sequence[_Place]:
-        """Where to look for somebody, as it was when that was asked first."""
-        if look.camera is None:
-            return ((sighting.x, sighting.y),)
-        return beside(self._greenhouse, sighting.x, sighting.y, look.camera)
 
 
 def _own_zones(people: People, look: Look) -> Iterator[tuple[TrackedPerson, Sighting]]:
@@ -254,63 +245,6 @@ def _own_zones(people: People, look: Look) -> Iterator[tuple[TrackedPerson, Sigh
                 and not (one.reach_m or one.laser)
             ):
                 yield person, one
-
-
-def beside(
-    greenhouse: Greenhouse, x: float, y: float, seen_from: Pose2D
-) -> Sequence[_Place]:
-    """Where somebody may stand whose box lies in something that the plan draws.
-
-    Boxes are off by 0.4 m; deeper in it the place is left as it is, where nobody looks.
-    """
-    most = LIMITS.uncertainty_m + _BODY_M
-    places = list(_besides(greenhouse, x, y, seen_from))
-    is_near = all(math.dist(one, (x, y)) <= most + 1e-9 for one in places)
-    return places if places and is_near else [(x, y)]
-
-
-def _besides(
-    greenhouse: Greenhouse, x: float, y: float, seen_from: Pose2D
-) -> Iterator[_Place]:
-    """Places beside: nobody stands in a wall, and nobody sees through crop.
-
-    So they are on the observer's side of that; over crates one sees, so it is each side
-    that is near.
-    """
-    walls = greenhouse.bounds
-    x = min(max(x, walls.xmin + _BODY_M), walls.xmax - _BODY_M)
-    y = min(max(y, walls.ymin + _BODY_M), walls.ymax - _BODY_M)
-    for row in greenhouse.rows:
-        if row.contains(x, y):
-            yield from [place for _, place in sorted(_sides(row, x, y, seen_from))[:1]]
-            return
-    for one in greenhouse.obstacles:
-        if one.area.contains(x, y):
-            sides = (place for _, place in _sides(one.area, x, y, None))
-            yield from (place for place in sides if walls.contains(*place))
-            return
-    yield x, y
-
-
-def _sides(
-    area: Rectangle, x: float, y: float, seen_from: Pose2D | None
-) -> list[tuple[float, tuple[float, float]]]:
-    """Sides of an area that a place in it is near: how deep in it is, and beside it.
-
-    Of those alone that are seen from somewhere, if that is given.
-    """
-    here = seen_from
-    sides = [
-        (x - area.xmin, (area.xmin - _BODY_M, y), here and here.x < area.xmin),
-        (area.xmax - x, (area.xmax + _BODY_M, y), here and here.x > area.xmax),
-        (y - area.ymin, (x, area.ymin - _BODY_M), here and here.y < area.ymin),
-        (area.ymax - y, (x, area.ymax + _BODY_M), here and here.y > area.ymax),
-    ]
-    return [
-        (deep, place)
-        for deep, place, is_seen in sides
-        if deep <= LIMITS.uncertainty_m and (here is None or is_seen)
-    ]
 
 
 # --- blind cameras ----------------------------------------------------------------

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from iveg.domain.detector import OutOfService
-from iveg.domain.geometry import Pose2D, Rectangle
-from iveg.domain.greenhouse import PlacedObstacle
 from iveg.domain.observations import Detection
-from iveg.domain.tracking.sight import beside, visible_from
+from iveg.domain.tracking.sight import visible_from
 from tests.builders import at, detection, detection_frame, origin
 from tests.unit.domain.scene import HEDGE, Scene, person
 
@@ -214,52 +212,3 @@ def test_an_old_look_vouches_for_nothing(age: float, sees: bool) -> None:
     scene.look("AGI")
 
     assert can_see(scene, 4.0, 0.0, now=age) is sees
-
-
-CRATES = Rectangle(4.0, 4.0, 5.2, 4.6)
-YARD = replace(HEDGE, obstacles=(PlacedObstacle("crates", CRATES),))
-
-
-@pytest.mark.parametrize(
-    ("box", "seen_from", "places"),
-    [
-        ((2.95, 1.0), (0.0, 0.0), [(2.6, 1.0)]),
-        ((2.8, 1.0), (0.0, 0.0), [(2.8, 1.0)]),
-        ((4.6, 4.3), (4.5, 0.0), [(4.6, 3.7), (4.6, 4.9)]),
-        ((100.3, 1.0), (90.0, 0.0), [(99.7, 1.0)]),
-        ((100.5, 1.0), (90.0, 0.0), [(100.5, 1.0)]),
-    ],
-)
-def test_who_is_seen_in_what_the_plan_draws_stands_beside_it(
-    box: tuple[float, float],
-    seen_from: tuple[float, float],
-    places: list[tuple[float, float]],
-) -> None:
-    found = beside(YARD, *box, Pose2D(*seen_from, 0.0))
-    assert np.array(found) == pytest.approx(np.array(places))
-
-
-@pytest.mark.parametrize(("y", "gone"), [(0.0, 1), (2.9, 0)])
-def test_who_was_seen_in_crates_is_gone_when_each_side_that_is_near_is_empty(
-    y: float, gone: int
-) -> None:
-    """Near the crates their front is too near to be in the picture."""
-    scene = Scene(greenhouse=replace(YARD, rows=()))
-    scene.drive("AGI", 4.3, y, 1.57, linear=0.0)
-    scene.look("AGI", person(4.3, 4.1))
-    scene.now = 1.1
-    for _ in range(13):
-        scene.drive("AGI", 4.3, y, 1.57, linear=0.0)
-        scene.look("AGI")
-        scene.now = round(scene.now + 0.1, 6)
-    assert len(scene.ended) == gone
-
-
-def test_a_mistake_in_the_crop_goes_as_the_place_beside_it_is_seen_to_be_empty() -> (
-    None
-):
-    scene = Scene(greenhouse=HEDGE)
-    scene.drive("AGI", 0.0, linear=0.0)
-    scene.look("AGI", person(3.0, 0.5))
-    scene.now = 1.1
-    assert watched(scene, 1.2) == ["P1"]
