@@ -10,7 +10,7 @@ from pydantic import Strict
 
 @dataclass(frozen=True, slots=True)
 class Quantity(GroupedMetadata):
-    """What one member of a message is, on every way it takes; None: not known.
+    """One member of a message, on every way it takes; None: not known.
 
     Attributes:
         unit: SI, or such as ``0–1``; ``–``: none.
@@ -24,7 +24,7 @@ class Quantity(GroupedMetadata):
     most: float | None = None
 
     def __iter__(self) -> Iterator[object]:
-        """What a value is checked by when it is read."""
+        """Checks of a value when it is read."""
         yield Strict()
         if self.least is not None:
             yield Ge(self.least)
@@ -57,7 +57,7 @@ def flags_of(of: type) -> list[str]:
 
 
 def value_of(observation: object) -> dict[str, Any]:
-    """What a small sensor says, by name."""
+    """Values of a small sensor, by name."""
     return {
         name: getattr(observation, name) for name in quantities_of(type(observation))
     }

@@ -8,20 +8,6 @@ from iveg.domain import errors
 from tests.processes import ROOT
 
 _RIDDLE = re.compile(r"(Who|Whom|Whose|What|How|Of|The same|That)\b")
-_TO_DO = """
-    adapters/identity_provider adapters/oidc adapters/passwords adapters/worker
-    app/door cli/robot comfort/shadow_run domain/accounts domain/audit
-    domain/peer_scan domain/quantities lab/commands/experiment
-    lab/emulator/scenarios lab/emulator/world lab/experiment/desired_states
-    lab/experiment/protection lab/experiment/report lab/experiment/scoring
-    lab/experiment/stage lab/experiment/tables vital/__init__ vital/evaluate
-    vital/event_log vital/log_messages web/api/account web/api/goals web/build
-    web/live/pictures web/pages/signing web/refusals web/security/attempts
-    web/security/audited web/security/authentication web/security/people
-    web/security/rate_limits web/security/requirements web/security/sessions
-"""
-STILL_TO_DO = frozenset(_TO_DO.split())
-"""Modules of ``iveg`` with such heads; this list only shrinks."""
 
 
 def test_no_head_of_a_docstring_is_a_riddle() -> None:
@@ -31,7 +17,7 @@ def test_no_head_of_a_docstring_is_a_riddle() -> None:
         if (heads := [*_riddles(ast.parse(path.read_text()))])
     }
 
-    assert {path: found[path] for path in found.keys() - STILL_TO_DO} == {}
+    assert found == {}
 
 
 def test_the_error_tree_is_drawn_whole() -> None:
