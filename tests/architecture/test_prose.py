@@ -11,9 +11,9 @@ _RIDDLE = re.compile(r"(Who|Whom|Whose|What|How|Of|The same|That)\b")
 _TO_DO = """
     adapters/direct adapters/files adapters/fiware_http adapters/identity_provider
     adapters/mqtt adapters/oidc adapters/passwords adapters/toml_files
-    adapters/worker app/door cli/robot comfort/messenger comfort/shadow_run
+    app/door cli/robot comfort/messenger comfort/shadow_run
     domain/accounts domain/audit domain/kinds domain/observations domain/peer_scan
-    domain/probe domain/quantities domain/transports lab/commands/experiment
+    domain/probe domain/transports lab/commands/experiment
     lab/emulator/scenarios lab/emulator/world lab/experiment/desired_states
     lab/experiment/protection lab/experiment/report lab/experiment/scoring
     lab/experiment/stage lab/experiment/tables ngsi/codec/attributes
