@@ -88,7 +88,7 @@ def _past_routers(dss: Dss, pages: drawing.Pages) -> Iterator[APIRouter]:
             __version__,
         )
     )
-    yield alerts.notes_router(queries, dss.fleet.members, dss.core.event_log.log, clock)
+    yield alerts.notes_router(queries, dss.core.event_log.log, clock)
     if dss.sign_in_token:
         yield account.sign_in_code_router(dss.sign_in_token)
     yield account.router(dss.accounts.people)

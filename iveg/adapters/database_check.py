@@ -1,7 +1,5 @@
 """Whether the history's database can be used."""
 
-from collections.abc import Sequence
-
 from sqlalchemy.exc import DatabaseError
 
 from iveg.adapters.history.engine import (
@@ -33,17 +31,12 @@ def check_database(database_url: str) -> None:
         raise HopError("database", reason_of(error)) from error
     finally:
         engine.dispose()
-    _compare(found, known)
-
-
-def _compare(found: str | None, newest_first: Sequence[str]) -> None:
-    newest = newest_first[0]
-    if found == newest:
-        return
-    if found is not None and found not in newest_first:
+    newest = known[0]
+    if found is not None and found not in known:
         raise HopError("database", f"a newer iVeg wrote it (migration {found})")
-    raise HopError(
-        "database",
-        f"it is at migration {found or 'none'} and the newest is {newest}; "
-        "`iveg db upgrade` mends that",
-    )
+    if found != newest:
+        raise HopError(
+            "database",
+            f"it is at migration {found or 'none'} and the newest is {newest}; "
+            "`iveg db upgrade` mends that",
+        )

@@ -11,6 +11,7 @@ import pickle
 import signal
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from typing import ParamSpec, TypeVar
@@ -42,7 +43,7 @@ class Worker:
     ) -> None:
         self._failed = failed
         self._limit_s = limit_s
-        # Who waits for the process is a thread; there, too, values are pickled.
+        # A thread waits for the process, and pickles values.
         self._thread = ThreadPoolExecutor(1, _NAME)
         self._process: SpawnProcess | None = None
         self._line: Connection | None = None
@@ -129,12 +130,9 @@ def _serve(line: Connection) -> None:
     """Answer until the server is gone; Ctrl-C is the server's to heed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     give_way()
-    while True:
-        try:
-            work, args, kwargs = line.recv()
-        except EOFError:
-            return
-        line.send_bytes(_answer(work, args, kwargs))
+    with suppress(EOFError):
+        while True:
+            line.send_bytes(_answer(*line.recv()))
 
 
 def _answer(
@@ -142,7 +140,7 @@ def _answer(
     args: Sequence[object],
     kwargs: Mapping[str, object],
 ) -> bytes:
-    """The result, or the hop that failed and its detail, pickled."""
+    """Result, hop that failed and its detail, pickled."""
     try:
         return pickle.dumps((work(*args, **kwargs), "", ""))
     except HopError as error:

@@ -10,7 +10,7 @@ from pydantic import Strict
 
 @dataclass(frozen=True, slots=True)
 class Quantity(GroupedMetadata):
-    """One member of a message, on every way it takes; None: not known.
+    """Unit, meaning and bounds of one member of a message; None: not known.
 
     Attributes:
         unit: SI, or such as ``0–1``; ``–``: none.
@@ -24,7 +24,7 @@ class Quantity(GroupedMetadata):
     most: float | None = None
 
     def __iter__(self) -> Iterator[object]:
-        """Checks of a value when it is read."""
+        """Checks of a value that is read."""
         yield Strict()
         if self.least is not None:
             yield Ge(self.least)
@@ -35,25 +35,25 @@ class Quantity(GroupedMetadata):
 _QUANTITIES: dict[type, dict[str, Quantity]] = {}
 
 
-def quantities_of(of: type) -> dict[str, Quantity]:
+def quantities_of(message: type) -> dict[str, Quantity]:
     """The quantities of a message, by name.
 
     Asked for each robot in each frame of a page, so they are looked up once.
     """
-    if of not in _QUANTITIES:
-        _QUANTITIES[of] = {
+    if message not in _QUANTITIES:
+        _QUANTITIES[message] = {
             name: part
-            for name, hint in get_type_hints(of, include_extras=True).items()
+            for name, hint in get_type_hints(message, include_extras=True).items()
             for part in getattr(hint, "__metadata__", ())
             if isinstance(part, Quantity)
         }
-    return _QUANTITIES[of]
+    return _QUANTITIES[message]
 
 
-def flags_of(of: type) -> list[str]:
+def flags_of(message: type) -> list[str]:
     """The quantities of a small sensor that are true or false, by name."""
-    types = get_type_hints(of)
-    return [name for name in quantities_of(of) if types[name] == bool | None]
+    types = get_type_hints(message)
+    return [name for name in quantities_of(message) if types[name] == bool | None]
 
 
 def value_of(observation: object) -> dict[str, Any]:

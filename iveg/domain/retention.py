@@ -106,13 +106,10 @@ class Retention:
             recorded: Days (UTC, since 1970) with a line in the log, newest first; at
                 least as many as the longest horizon, if there are.
         """
-        horizons: dict[RetentionKind, int] = {
-            kind: getattr(self, kind) for kind in _PURGED
-        }
         return {
             kind: cutoff(days, now, recorded)
-            for kind, days in horizons.items()
-            if days > 0 and recorded
+            for kind in _PURGED
+            if recorded and (days := getattr(self, kind)) > 0
         }
 
 

@@ -143,11 +143,6 @@ class Queries:
         wanted = unseen.order_by(a.last_raised_at.desc(), a.alert_id.desc()).limit(most)
         return await self.ask(_records, AlertRecord, wanted)
 
-    async def command_events(self, command_id: str) -> tuple[CommandEventRecord, ...]:
-        """The audit trail of a command, oldest first."""
-        steps = await self.steps_of([command_id])
-        return tuple(steps.get(command_id, ()))
-
     async def steps_of(
         self, command_ids: Sequence[str]
     ) -> dict[str, list[CommandEventRecord]]:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from sqlalchemy import (
+    ColumnElement,
     Connection,
     Table,
     TextClause,
@@ -22,6 +23,7 @@ from sqlalchemy import (
     exists,
     func,
     null,
+    or_,
     select,
     text,
     true,
@@ -131,17 +133,19 @@ def lost_of(
     d, s = detections.c, decisions.c
     decided = and_(s.started_at >= since, s.started_at < until)
     # A decision was about somebody, and its robot drove.
-    unplaced = select(exists().where(decided, s.x.is_(None)))
-    unplaced_look = select(exists().where(d.at >= since, d.at < until, d.x.is_(None)))
-    driven = connection.scalar(select(func.min(odometry.c.at)))
-    lost: list[Literal["places", "telemetry"]] = []
-    if any(connection.scalar(one) for one in (unplaced, unplaced_look)):
-        lost.append("places")
-    if driven is not None:
-        unknown = select(exists().where(decided, s.started_at < driven))
-        if driven >= until or connection.scalar(unknown):
-            lost.append("telemetry")
-    return tuple(lost)
+    unplaced = or_(
+        exists().where(decided, s.x.is_(None)),
+        exists().where(d.at >= since, d.at < until, d.x.is_(None)),
+    )
+    oldest = select(func.min(odometry.c.at)).scalar_subquery()
+    undriven = or_(oldest >= until, exists().where(decided, s.started_at < oldest))
+    lost: Mapping[Literal["places", "telemetry"], ColumnElement[bool]] = {
+        "places": unplaced,
+        "telemetry": undriven,
+    }
+    return tuple(
+        kind for kind, is_lost in lost.items() if connection.scalar(select(is_lost))
+    )
 
 
 def recorded_days(connection: Connection, most: int) -> tuple[int, ...]:

@@ -4,15 +4,14 @@ A note is a line of the log, pinned to a time and a place.  It is written once, 
 into the incident packs of its moment.
 """
 
-from collections.abc import Callable, Collection
-from typing import Annotated, Any, Self
+from collections.abc import Callable
+from typing import Annotated, Self
 
 from fastapi import APIRouter, HTTPException, Query, Response
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from iveg.adapters.history import lists
 from iveg.adapters.history.queries import Queries
-from iveg.domain.errors import UnknownRobotError
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import Instant
 from iveg.domain.wire import clean_text, legible
@@ -112,7 +111,6 @@ class NoteRequest(BaseModel):
 
 def notes_router(
     queries: Queries,
-    fleet: Collection[str],
     log: Callable[[LogEvent, Instant], None],
     clock: Clock,
 ) -> APIRouter:
@@ -120,7 +118,6 @@ def notes_router(
 
     Args:
         queries: The history.
-        fleet: Robots of now; notes may also be about those that records name.
         log: Takes the lines.
         clock: What a note without a time is about.
     """
@@ -138,16 +135,13 @@ def notes_router(
         page = await queries.page(lists.NOTES, wanted)
         return Json(Listing(items=[Note.from_record(one) for one in page.items]))
 
-    @routes.post("/notes", status_code=201, responses=refusals(404))
+    @routes.post("/notes", status_code=201)
     async def write(body: NoteRequest, who: Operator) -> dict[str, str]:
         """Write one down; it cannot be taken back."""
         now = clock()
         pinned_at = now.wall if body.at is None else body.at.timestamp()
         if not now.wall - LONGEST_AGO_S <= pinned_at <= now.wall:
             raise HTTPException(422, "A note is about a moment of the last 400 days.")
-        robot = body.robot_id
-        if not (robot is None or robot in fleet or await _is_recorded(queries, robot)):
-            raise UnknownRobotError(robot)
         slots: dict[str, Slot] = {
             "by": who.name,
             "text": body.text,
@@ -156,21 +150,10 @@ def notes_router(
         }
         if body.x is not None:
             slots |= {"x": body.x, "y": body.y}
-        log(LogEvent("system", KEY, slots, robot, decision_id=body.decision_id), now)
+        log(
+            LogEvent("system", KEY, slots, body.robot_id, decision_id=body.decision_id),
+            now,
+        )
         return {"detail": "It is on the record."}
 
     return routes
-
-
-async def _is_recorded(queries: Queries, robot: str) -> bool:
-    """Whether a decision, an order or an alert names a robot that left the fleet."""
-    wanted = lists.Filter(robot=robot, limit=1)
-    naming: tuple[lists.ListOf[Any], ...] = (
-        lists.DECISIONS,
-        lists.COMMANDS,
-        lists.ALERTS,
-    )
-    for listed in naming:
-        if (await queries.page(listed, wanted)).items:
-            return True
-    return False

@@ -173,7 +173,8 @@ async def _kept(queries: Queries, command_id: str) -> Command | None:
     found = await queries.one(COMMANDS, command_id)
     if found is None:
         return None
-    return Command.from_record(found, await queries.command_events(command_id))
+    steps = await queries.steps_of([command_id])
+    return Command.from_record(found, steps.get(command_id, ()))
 
 
 def _joined(followed: Command | None, kept: Command | None) -> Command | None:

@@ -71,9 +71,7 @@ class Desk:
         self.app.include_router(router(self.sources))
         self.app.dependency_overrides[require("read")] = lambda: None
         self.clock = FakeClock()
-        self.app.include_router(
-            alerts.notes_router(self.queries, ["R1"], self.log, self.clock)
-        )
+        self.app.include_router(alerts.notes_router(self.queries, self.log, self.clock))
         problems.install(self.app)
 
     async def fill(self) -> None:
@@ -198,14 +196,3 @@ async def test_an_alerts_pack_has_what_people_noted_about_its_minutes(
     early = await ask(desk, since="2023-11-14T22:13:20Z", until="2023-11-14T22:14:21Z")
     with zipfile.ZipFile(io.BytesIO(early.content)) as whole:
         assert whole.read("rows/notes.ndjson") == b""
-
-
-async def test_a_note_is_about_a_robot_of_the_fleet_or_of_a_record(desk: Desk) -> None:
-    answers = []
-    async with client_of(desk) as client:
-        for robot in ("R1", alert_record().slots["robot"], "R9"):
-            body = {"text": "a", "robot_id": robot}
-            answers.append(await client.post("/api/v1/notes", json=body))
-
-    assert [one.status_code for one in answers] == [201, 201, 404]
-    assert answers[-1].json()["type"].endswith("unknown-robot")
