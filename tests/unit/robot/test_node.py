@@ -122,7 +122,9 @@ async def test_a_released_and_resumed_robot_drives_and_a_stop_zeroes_it(
     drove = bench.driven[-1]
     bench.link.take(COMMANDS, stop("01STOP"))
     stood = bench.driven[-1]
-    await asyncio.sleep(0.05)
+    async with asyncio.timeout(10.0):
+        while len(bench.link.answers()) < 3:  # noqa: ASYNC110 - after the disk
+            await asyncio.sleep(0.01)
     task.cancel()
     await asyncio.gather(task, return_exceptions=True)
 
