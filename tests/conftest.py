@@ -41,7 +41,7 @@ _WAITING = (
         "integration/test_replay",
     ),
     *("chaos/test_ros2_kills", "integration/test_emulator", "chaos/test_network"),
-    *("integration/test_robot_node", "chaos/test_kills", "chaos/test_faults"),
+    *("chaos/test_kills", "chaos/test_faults"),
     *("integration/test_deploy", "integration/test_decisions"),
     *("integration/test_ros2_robot", "integration/test_doctor"),
 )

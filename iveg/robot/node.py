@@ -34,7 +34,6 @@ from iveg.domain.observations import (
 from iveg.domain.witness import Outline, Plan
 from iveg.ngsi import names
 from iveg.ngsi.codec import read_feedback
-from iveg.robot.feedback import Authors
 from iveg.robot.gate import FREE, Cap
 from iveg.robot.goals import Facts, Navigate, RobotGoals, read_goal
 from iveg.robot.holds import read_holds, write_holds
@@ -129,6 +128,11 @@ class RobotNode:
         profile: Its body, and speeds of the drive.
         drive: Takes what the gate lets through; must not block.
         navigate: Takes goals of iVeg; None: the robot takes none.
+
+    Attributes:
+        machine: Its safety machine, for reading.
+        faults: Data faults that the next reports carry.
+        asks_for_scans: Whether they ask iVeg for scans of peers.
     """
 
     def __init__(
@@ -144,8 +148,8 @@ class RobotNode:
         self._read_clock = settings.read_clock
         self._started = self._read_clock().mono
         self._on_peer_scan: Callable[[str, bytes], None] | None = None
-        self._asks_for_scans = False
-        self._faults: tuple[RobotFault, ...] = ()
+        self.asks_for_scans = False
+        self.faults: tuple[RobotFault, ...] = ()
         self._commanded: tuple[Twist2D, float] = REST, 0.0
         self._goals = RobotGoals(robot_id, navigate)
         self._placed: tuple[Pose2D | None, float] = None, 0.0
@@ -170,7 +174,7 @@ class RobotNode:
             replay=settings.replay,
         )
         self._uplink = Uplink(robot_id, settings.apikey, origins, self._link.enqueue)
-        self._machine = SafetyMachine(
+        self.machine = SafetyMachine(
             robot_id,
             boot,
             self._started,
@@ -194,19 +198,19 @@ class RobotNode:
         self._link.attach(topics, self._on_message, on_stored=self._on_stored)
 
     def _echoes(self) -> tuple[FeedbackRef, ...]:
-        return self._machine.authors.echoes(self._read_clock().mono)
+        return self.machine.authors.echoes(self._read_clock().mono)
 
     # --- state for upstream -------------------------------------------------------
 
     @property
     def state(self) -> State:
         """State of the safety machine."""
-        return self._machine.state(self._read_clock().mono)
+        return self.machine.state(self._read_clock().mono)
 
     @property
     def holds(self) -> tuple[Hold, ...]:
         """Holds of the robot."""
-        return self._machine.holds.holds
+        return self.machine.holds.holds
 
     @property
     def may_drive(self) -> bool:
@@ -215,12 +219,7 @@ class RobotNode:
         After a resume the robot moves only once upstream has requested zero, or sent no
         twist at all, for 0.5 s.
         """
-        return self._machine.may_drive
-
-    @property
-    def authors(self) -> Authors:
-        """Feedback of iVeg, with what it tells of others."""
-        return self._machine.authors
+        return self.machine.may_drive
 
     @property
     def goal(self) -> Goal | None:
@@ -230,7 +229,7 @@ class RobotNode:
     @property
     def speed_factor(self) -> float:
         """Speed factor of the gate, holds excepted."""
-        return self._machine.cap.factor
+        return self.machine.cap.factor
 
     @property
     def connected(self) -> bool:
@@ -260,13 +259,13 @@ class RobotNode:
         for one in observations:
             if isinstance(one, Odometry):
                 self._placed = one.pose, mono
-                self._perform(self._machine.odometry(one.pose, one.twist, mono), mono)
+                self._perform(self.machine.odometry(one.pose, one.twist, mono), mono)
             elif isinstance(one, LaserScan) and not self._is_replay:
-                self._perform(self._machine.scan(one, mono), mono)
+                self._perform(self.machine.scan(one, mono), mono)
             elif isinstance(one, Navigation):
-                self._machine.note_path(one.path, mono)
+                self.machine.note_path(one.path, mono)
             elif isinstance(one, Unplaced) and one.twist is not None:
-                self._perform(self._machine.odometry(None, one.twist, mono), mono)
+                self._perform(self.machine.odometry(None, one.twist, mono), mono)
         if self._link.connected:
             own = self._own(now)
             for one in observations:
@@ -275,54 +274,46 @@ class RobotNode:
     def request_twist(self, twist: Twist2D) -> None:
         """Take upstream navigation's ``cmd_vel``; it expires after 0.5 s."""
         now = self._read_clock().mono
-        self._perform(self._machine.request_twist(twist, now), now)
+        self._perform(self.machine.request_twist(twist, now), now)
 
     def limit(self, factor: float, cause: str | None = None) -> None:
         """Limit the speed factor (0, 0.5 or 1) for the robot's own software.
 
         The limit applies in addition to iVeg's, never instead of it.
         """
-        self._machine.limit(FREE if factor >= 1.0 else Cap(factor, "stale", cause))
-
-    def set_faults(self, faults: tuple[RobotFault, ...]) -> None:
-        """Set the data faults that the next reports carry."""
-        self._faults = faults
+        self.machine.limit(FREE if factor >= 1.0 else Cap(factor, "stale", cause))
 
     def hear_peer_scans(self, on_scan: Callable[[str, bytes], None]) -> None:
         """Hand on scans of peers as they come, by topic; call it before ``run``."""
         self._on_peer_scan = on_scan
         self._subscribe(**{names.PEER_SCAN_FILTER: 0})
 
-    def ask_for_peer_scans(self, wanted: bool) -> None:
-        """Have the next reports ask iVeg for scans of peers, or no longer."""
-        self._asks_for_scans = wanted
-
     def add_local_hold(self, source: Literal["hw", "bumper"]) -> None:
         """Hold the robot because its red button or bumper was pressed."""
         now = self._read_clock().mono
-        self._perform(self._machine.local_hold(source, now), now)
+        self._perform(self.machine.local_hold(source, now), now)
 
     def release_locally(self) -> None:
         """Lift boot, button and bumper holds and resume, for the crew at the robot."""
         now = self._read_clock().mono
-        self._perform(self._machine.release_locally(now), now)
+        self._perform(self.machine.release_locally(now), now)
 
     def _tick(self, _: float) -> None:
         now = self._read_clock().mono
-        self._perform(self._machine.tick(now), now)
+        self._perform(self.machine.tick(now), now)
 
     def _on_message(self, topic: str, payload: bytes) -> None:
         now = self._read_clock().mono
         if topic == self._command_topic:
             order = read_goal(payload)
             if order is None:
-                self._perform(self._machine.command(payload, now), now)
+                self._perform(self.machine.command(payload, now), now)
             else:
                 # First what the machine knows by now: the link may have just been lost.
-                self._perform(self._machine.tick(now), now)
+                self._perform(self.machine.tick(now), now)
                 self._answer(*self._goals.answer(order, self._facts(now)))
         elif topic == self._desired_topic:
-            self._perform(self._machine.desired(payload, now), now)
+            self._perform(self.machine.desired(payload, now), now)
         elif self._on_peer_scan is not None and topic.endswith(names.PEER_SCAN_END):
             self._on_peer_scan(topic, payload)
         else:
@@ -339,8 +330,8 @@ class RobotNode:
         except UnreadableError:
             return  # Counts as no feedback: the watchdog does the rest.
         peer = topic.removeprefix("/").partition("/")[0]
-        self._perform(self._machine.feedback(peer, feedback, now), now)
-        self._uplink.rates.note_backlog(self._machine.authors.backlog_s(), now)
+        self._perform(self.machine.feedback(peer, feedback, now), now)
+        self._uplink.rates.note_backlog(self.machine.authors.backlog_s(), now)
 
     # --- effects ------------------------------------------------------------------
 
@@ -361,11 +352,11 @@ class RobotNode:
     def _facts(self, now: float) -> Facts:
         pose, at = self._placed
         return Facts(
-            self._machine.state(now) == "RUNNING",
-            self._machine.challenge,
+            self.machine.state(now) == "RUNNING",
+            self.machine.challenge,
             now - self._started,
             pose if now - at <= LIMITS.pose_stand_s else None,
-            self._machine.stands(now),
+            self.machine.stands(now),
         )
 
     def _command_drive(self, twist: Twist2D, now: float) -> None:
@@ -384,11 +375,11 @@ class RobotNode:
             self._lane.answer(self._uplink.answer(answer, own))
 
     def _report(self, report: SafetyReport, *, is_measure: bool) -> None:
-        now, wish = self._read_clock(), self._asks_for_scans
-        report = replace(report, faults=self._faults, peer_scans=wish)
+        now = self._read_clock()
+        report = replace(report, faults=self.faults, peer_scans=self.asks_for_scans)
         own = self._own(now)
         seq, messages = self._uplink.report(report, own, is_measure=is_measure)
-        self._machine.reported(seq, now.mono)
+        self.machine.reported(seq, now.mono)
         for message in messages:
             self._lane.report(message)
 

@@ -75,14 +75,6 @@ def test_a_reader_hears_a_writer_that_offers_what_it_asks(
     assert found == sorted(found)
 
 
-def test_who_comes_late_gets_what_was_kept(dds: Dds) -> None:
-    kept = dds.reader("/kept", ros.Twist, KEPT)
-
-    numbers = until(lambda: heard(kept), "what was kept")
-
-    assert numbers == [0.0, 1.0, 2.0]
-
-
 @pytest.mark.parametrize(
     ("topic", "asked"), [("/best_effort", RELIABLE), ("/reliable", KEPT)]
 )
@@ -97,23 +89,6 @@ def test_a_reader_that_asks_for_more_than_is_offered_hears_nothing_and_shows_it(
 
     assert reader.writers == 0
     assert not asked.hears(offered.qos)
-
-
-def test_endpoints_have_the_names_of_ros_and_say_whose_they_are(dds: Dds) -> None:
-    writer = dds.writer("/ours", ros.TwistStamped, RELIABLE)
-
-    def foreign() -> bool:
-        return {"/best_effort", "/reliable", "/kept"} <= {
-            one.topic for one in dds.endpoints() if one.writes and not one.own
-        }
-
-    until(foreign, "the talker's topics")
-    ours = [one for one in dds.endpoints() if one.own and one.topic == "/ours"]
-
-    assert writer.readers == 0
-    assert [(one.type, one.writes) for one in ours] == [
-        ("geometry_msgs/msg/TwistStamped", True)
-    ]
 
 
 def test_a_message_of_another_layout_never_arrives(dds: Dds, domain: int) -> None:
@@ -186,23 +161,6 @@ def test_a_publisher_that_came_and_went_between_two_looks_is_told_once(
 
     assert "/brief" in _topics(dds)
     assert "/brief" not in _topics(dds)
-
-
-def test_a_reader_that_joins_while_readers_are_counted_is_counted(
-    dds: Dds, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    writer = dds.writer("/counted", ros.Twist, RELIABLE)
-    answers: list[list[int]] = [[], [1, 2]]
-
-    def matched(_: object) -> list[int]:
-        answer = answers.pop(0)
-        if not answer:
-            raise IndexError
-        return answer
-
-    monkeypatch.setattr("cyclonedds.pub.DataWriter.get_matched_subscriptions", matched)
-
-    assert writer.readers == 2
 
 
 def test_a_process_that_was_killed_is_gone_within_seconds(

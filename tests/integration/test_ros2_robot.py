@@ -3,20 +3,17 @@
 import asyncio
 import math
 import re
-from collections.abc import AsyncIterator, Iterator, Sequence
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
-import numpy as np
 import pytest
 
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.feedback import CLEAR, Feedback
-from iveg.domain.geometry import Pose2D
-from iveg.domain.observations import DetectionFrame, LaserScan, Origin, SafetyReport
-from iveg.domain.peer_scan import peer_scan_of
+from iveg.domain.observations import DetectionFrame, Origin, SafetyReport
 from iveg.ngsi import codec
 from iveg.ngsi.names import direct_topic, measure_topic
 from iveg.ros2 import cdr, names
@@ -30,8 +27,6 @@ ROBOT = "AGI"
 _KEY, _DETECTIONS = "iveg", "_yolox_bounding_boxes"
 PERSON = d.BoundingBox3d("farmer", 0.9, 2.8, 0.2, 3.2, 0.8, 0.0, 1.8)
 """3 m before the robot and 0.5 m to its left."""
-_BURST = 100
-"""Twice what a reader holds."""
 
 
 @dataclass
@@ -75,7 +70,6 @@ class Iveg:
     def __init__(self, address: BrokerAddress) -> None:
         self.report: SafetyReport | None = None
         self.frame: DetectionFrame | None = None
-        self._told = 0
         self._devices = {
             direct_topic(ROBOT, "_safety"): f"{ROBOT}_safety",
             measure_topic(_KEY, f"{ROBOT}{_DETECTIONS}"): f"{ROBOT}{_DETECTIONS}",
@@ -104,30 +98,15 @@ class Iveg:
             self.link.enqueue(topic, codec.write_feedback(said), 1)
             await asyncio.sleep(0.1)
 
-    def tell_of_peer(self) -> None:
-        """Another robot is 6 m ahead, and its laser met something 3 m beyond."""
-        self._told += 1
-        stamp = codec.format_stamp(clock.wall())
-        here = Pose2D(6.0, 0.0, 0.0)
-        whole = Origin("b", self._told, stamp)
-        peer = Feedback("AGII", whole, pose=here, pose_stamp=stamp)
-        self.link.enqueue("/AGII/mqtt_feedback", codec.write_feedback(peer), 1)
-        rays = np.full(360, 3.04, np.float32)
-        turn = -math.pi, math.tau / 360, 0.1, 12.0
-        scan = LaserScan("AGII", whole, *turn, Pose2D(0.0, 0.0, 0.0), rays)
-        told = codec.write_peer_scan(peer_scan_of(scan, here, 0.1))
-        self.link.enqueue("/AGII/iveg/peer_scan", told)
-
 
 class Sensors:
     """A base's odometry, on DDS, and its ear."""
 
     def __init__(self, dds: Dds) -> None:
-        self._odometry = dds.writer("/odom", ros.Odometry, names.DEFAULT.newest(_BURST))
+        self._odometry = dds.writer("/odom", ros.Odometry, names.DEFAULT)
         self._tf = dds.writer("/tf", ros.TFMessage, names.DEFAULT)
         self._boxes = dds.writer("/yolact_coordinate", d.BoundingBoxes3d, names.DEFAULT)
         self.drive = dds.reader("/cmd_vel", ros.Twist, names.DEFAULT)
-        self.burst = 1
 
     async def talk(self) -> None:
         """Say where the base is thirty times a second, as often as ``burst``."""
@@ -141,8 +120,7 @@ class Sensors:
             self._tf.write(cdr.write(ros.TFMessage(links)))
             base = ros.Header(stamp, "base_link")
             self._boxes.write(cdr.write(d.BoundingBoxes3d(base, (PERSON,))))
-            for _ in range(self.burst):
-                self._odometry.write(cdr.write(ros.Odometry(odom, "base_link")))
+            self._odometry.write(cdr.write(ros.Odometry(odom, "base_link")))
             await asyncio.sleep(1 / 30)
 
 
@@ -203,12 +181,6 @@ async def test_a_publisher_that_starts_after_the_gate_makes_it_stand(
         await reported(iveg, set(), 1.0)
 
 
-async def test_a_burst_on_dds_changes_nothing(riding: Riding) -> None:
-    async with at_work(riding) as (iveg, sensors):
-        sensors.burst = _BURST
-        await reported(iveg, set(), 1.0)
-
-
 async def test_a_check_tells_a_robot_that_talks_what_it_lacks(riding: Riding) -> None:
     lacks = [
         r"/odom +nav_msgs/msg/Odometry +1 +\d+\.\d +reliable +odom +ok",
@@ -242,42 +214,3 @@ def test_a_second_gate_refuses_and_says_who_drives(riding: Riding) -> None:
     assert said in riding.here.text()
     assert "only one program may drive this robot" in riding.elsewhere.text()
     assert riding.gate.process.poll() is None
-
-
-async def test_nav2s_static_layer_gets_the_fleets_picture(riding: Riding) -> None:
-    """A peer of the feedback, and what its laser met, which the robot asked for."""
-    kept = names.LATCHED
-    async with at_work(riding) as (iveg, _):
-        with Dds(loopback(riding.domain)) as nav2:
-            layer = nav2.reader("/iveg/costmap", ros.OccupancyGrid, kept)
-            async with asyncio.timeout(30.0):
-                while iveg.report is None or not iveg.report.peer_scans:  # noqa: ASYNC110
-                    await asyncio.sleep(0.05)
-                grid = None
-                while grid is None or cost(grid, 9.05, 0.05) < 100:
-                    iveg.tell_of_peer()
-                    grid = newest(layer.take(), grid)
-                    await asyncio.sleep(0.2)
-
-    assert grid.header.frame_id == "map"
-    assert cost(grid, 6.05, 0.05) == 100
-    assert cost(grid, 8.55, 0.05) == 0
-    assert cost(grid, 0.05, 0.05) == -1
-
-
-def newest(
-    waited: Sequence[bytes], before: ros.OccupancyGrid | None
-) -> ros.OccupancyGrid:
-    """The last of what came, if anything did."""
-    empty = ros.OccupancyGrid()
-    return cdr.read(ros.OccupancyGrid, waited[-1]) if waited else before or empty
-
-
-def cost(grid: ros.OccupancyGrid, x: float, y: float) -> int:
-    """At a place in ``map`` (m); unknown in a grid without cells."""
-    info = grid.info
-    if not grid.data.size:
-        return -1
-    column = math.floor((x - info.origin.position.x) / info.resolution)
-    row = math.floor((y - info.origin.position.y) / info.resolution)
-    return int(grid.data[row * info.width + column])

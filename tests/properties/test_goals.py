@@ -96,7 +96,7 @@ class Robot:
         self.wished = REST
         self.run(1.0)
         held = [one.id for one in self.node.holds]
-        machine = self.node._machine
+        machine = self.node.machine
         if held:
             self.hear(COMMANDS, release(held, machine.challenge))
         self.hear(COMMANDS, resume(machine.challenge))
@@ -123,7 +123,7 @@ class Robot:
             self.node.request_twist(self.wished)
 
     def send(self, kind: GoalKind = "here", late_s: float = 0.0) -> None:
-        machine = self.node._machine
+        machine = self.node.machine
         goal = Goal(f"01G{next(self._names)}", kind, 5.0, 0.0)
         order = GoalOrder(goal, machine.challenge, self.now - 100.0 + 10.0 - late_s)
         self._orders.append(codec.write_command(codec.write_goal(order), names.GOAL))

@@ -170,9 +170,12 @@ class SensorInputs:
         if topic not in _TREE:
             self._newest[topic] = message, arrived[-1]
             return
-        for one in arrived:
-            links = self._read(topic, message, one, now)
-            if links is not None:
+        for payload in arrived:
+            try:
+                links = cdr.read(message, payload)
+            except UnreadableError as error:
+                self._note(error.reason, topic, now)
+            else:
                 self._places.add(links, static=topic == "tf_static")
 
     def tick(self, now: Instant) -> list[Observation]:
@@ -208,28 +211,17 @@ class SensorInputs:
         now: Instant,
     ) -> Observation | None:
         """The observation of a message; None where it is unusable or old."""
-        message = self._read(topic, form, payload, now.mono)
-        if message is None:
-            return None
-        is_stream = TOPICS[topic].role == "stream"
-        if is_stream and not self._is_new(topic, message.header.stamp.seconds, now):
-            return None
         try:
+            message = cdr.read(form, payload)
+            is_stream = TOPICS[topic].role == "stream"
+            if is_stream and not self._is_new(topic, message.header.stamp.seconds, now):
+                return None
             found = work(message, now)
         except UnreadableError as error:
             self._note(error.reason, topic, now.mono)
             return None
         self._used_at[topic] = now.mono
         return found
-
-    def _read(self, topic: str, form: type[Message], payload: bytes, now: float) -> Any:
-        """A message of a topic; None for one that cannot be read."""
-        try:
-            return cdr.read(form, payload)
-        except UnreadableError:
-            about = f"{self._names[topic]}: {form.ROS.replace('/msg/', '/')}"
-            self.input_faults.note("unreadable", about, now)
-            return None
 
     def _is_new(self, topic: str, stamp: float, now: Instant) -> bool:
         """Whether a message counts by its stamp."""

@@ -279,7 +279,7 @@ class CostmapTopic:
         node.hear_peer_scans(self._hear)
 
     def _hear(self, topic: str, payload: bytes) -> None:
-        iveg_s = self._node.authors.newest_stamp_s
+        iveg_s = self._node.machine.authors.newest_stamp_s
         self._costmap.hear(topic, payload, self._place(), iveg_s)
 
     async def run(self) -> None:
@@ -298,10 +298,10 @@ class CostmapTopic:
     async def _tell(self) -> None:
         own = self._place()
         wanted = self._writer.readers > 0
-        self._node.ask_for_peer_scans(wanted)
+        self._node.asks_for_scans = wanted
         if wanted and own is not None:
             now, scans = clock.now(), self._costmap.drain_scans()
-            present = self._node.authors.neighbours(now.mono)
+            present = self._node.machine.authors.neighbours(now.mono)
             self._newest = await asyncio.to_thread(
                 self._costmap.draw, scans, present, own, now.mono
             )

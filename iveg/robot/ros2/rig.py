@@ -152,7 +152,7 @@ class Ros2Robot:
     def _judge(self, now: float) -> None:
         faults = self._faults.faults(now)
         self.node.limit(*speed_of(faults))
-        self.node.set_faults(faults)
+        self.node.faults = faults
         if faults or self._said:
             self._log(faults)
 
@@ -208,7 +208,10 @@ class Ros2Robot:
         if own is None or (cloud is None and drawing is None):
             return
         now = clock.now()
-        stamp, present = ros.Time.of(now.wall), self.node.authors.neighbours(now.mono)
+        stamp, present = (
+            ros.Time.of(now.wall),
+            self.node.machine.authors.neighbours(now.mono),
+        )
         if cloud is not None:
             found = outputs.cloud(present, own, stamp, frames.base_link)
             cloud.write(cdr.write(found))

@@ -32,15 +32,6 @@ def test_a_repeated_number_does_not_make_it_younger_nor_an_older_one_older() -> 
     assert watchdog.age(12.5) == 2.0
 
 
-def feed(watchdog: Watchdog, start: float, count: int, every: float) -> float:
-    now = start
-    for number in range(count):
-        now = start + number * every
-        watchdog.sent(int(now * 100), now)
-        watchdog.heard(int(now * 100), now)
-    return now
-
-
 # --- peer feedback ----------------------------------------------------------------
 
 HERE = Pose2D(0.0, 0.0, 0.0)
@@ -321,30 +312,6 @@ class AuthorsBench:
 
     def factor(self, at: float) -> float:
         return lowest(self.authors.caps(AT_THE_ROW, False, at)).factor
-
-
-@pytest.mark.parametrize(
-    "stray",
-    [Origin("stray", 7), Origin("iveg", 2**53), Origin("iveg", 103), Origin("iveg", 1)],
-    ids=["another boot", "a leap", "the next count", "an old count"],
-)
-def test_no_stray_message_makes_a_robot_drop_what_iveg_says_next(stray: Origin) -> None:
-    bench = AuthorsBench()
-    bench.go_on(0.0, 0.2)
-    bench.tell(0.3, origin=stray, backlog_s=9.0)
-    for step in range(4, 15):
-        assert bench.tell(0.1 * step)
-    assert bench.tell(1.5, limit=SLOW)
-    assert bench.factor(1.5) == 0.5
-
-
-def test_an_author_is_as_old_as_our_report_that_it_has_seen() -> None:
-    bench = AuthorsBench()
-    bench.tell(0.0)
-    bench.tell(1.5, seen_at=0.4)
-    assert bench.factor(1.5) == 0.5
-    bench.tell(1.6, seen_at=0.7)
-    assert bench.factor(1.6) == 1.0
 
 
 def test_whoever_is_told_by_an_author_that_fell_silent_stays_for_ten_seconds() -> None:

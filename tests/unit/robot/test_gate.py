@@ -122,33 +122,10 @@ def test_a_change_of_direction_starts_from_rest() -> None:
     assert -0.06 < gate.output(1.0, True, 4.05).linear_x < 0.0
 
 
-def test_a_turn_on_the_spot_is_capped_and_ramped() -> None:
-    gate = open_gate()
-    out = reach(gate, Twist2D(0.0, 1.0), 0.5, 1.1)
-    assert 0.0 < out.angular_z < 0.5
-    gate.request_twist(Twist2D(0.0, 1.0), 2.0)
-    for number in range(10):
-        out = gate.output(0.5, True, 2.0 + number / 20)
-    assert out.angular_z == 0.5
-
-
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
 def test_a_wish_that_is_no_number_is_a_wish_to_rest(wrong: float) -> None:
     assert reach(open_gate(), Twist2D(wrong, 0.0), 1.0, 2.0) == REST
     assert reach(open_gate(), Twist2D(0.5, wrong), 1.0, 2.0) == REST
-
-
-def test_a_wish_is_forgotten_after_half_a_second() -> None:
-    gate = open_gate()
-    reach(gate, FORWARD, 1.0, 4.0)
-    assert gate.output(1.0, True, 4.3) != REST
-    assert gate.output(1.0, True, 4.7) == REST
-
-
-def test_a_pause_of_the_program_does_not_make_the_robot_jump() -> None:
-    gate = open_gate()
-    gate.request_twist(FORWARD, 60.0)
-    assert gate.output(1.0, True, 60.0).linear_x <= 0.05
 
 
 def test_the_neutral_interlock_starts_anew_with_every_wish_to_move() -> None:
@@ -159,10 +136,3 @@ def test_the_neutral_interlock_starts_anew_with_every_wish_to_move() -> None:
     assert gate.neutral_needed
     gate.output(1.0, True, 0.96)
     assert not gate.neutral_needed
-
-
-def test_a_held_gate_gives_zero_whatever_is_wished() -> None:
-    gate = open_gate()
-    reach(gate, FORWARD, 1.0, 4.0)
-    gate.request_twist(FORWARD, 4.05)
-    assert gate.output(1.0, False, 4.05) == REST

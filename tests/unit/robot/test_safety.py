@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from iveg.domain.feedback import SpeedLimit
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Hold, LaserScan, Origin
 from iveg.robot.holds import HoldSet
@@ -194,18 +193,6 @@ def test_the_answer_to_an_order_names_its_attempt() -> None:
     assert rig.stop("01STOP").attempt is None
 
 
-def test_a_refused_attempt_stays_refused_when_all_would_be_right() -> None:
-    rig = Rig(speed=Twist2D(0.0, 0.05), obeys=False).run(0.5)
-    order = release(["boot-b1"], rig.machine.challenge, "01TRY")
-    first = rig.command(order)
-    rig.speed = REST
-    rig.run(1.0)
-    again = rig.command(order)
-    assert (first.why, again.why) == ("not_standing", "not_standing")
-    assert again.attempt == "01TRY"
-    assert rig.holds
-
-
 def test_an_attempt_that_is_forgotten_cannot_act_either() -> None:
     rig = Rig().run(0.5)
     order = release(["boot-b1"], rig.machine.challenge, "01TRY")
@@ -321,23 +308,6 @@ def test_a_level_that_stops_without_a_name_holds(payload: bytes) -> None:
 # --- watchdog -----------------------------------------------------------------------
 
 
-def test_silence_halves_after_one_second_and_holds_after_three() -> None:
-    rig = moving()
-    rig.speaks = False
-    before = len(rig.reports)
-    rig.run(1.5)
-    assert rig.twist == Twist2D(0.5, 0.2)
-    rig.run(2.5)
-    assert [(hold.source, hold.ack) for hold in rig.holds] == [("link", "auto")]
-    assert rig.twist == REST
-    news = rig.reports[before:]
-    slowed = next(one for one in news if one.speed_factor < 1.0)
-    held = next(one for one in news if one.holds)
-    assert slowed.reason == "watchdog"
-    assert slowed.feedback_age_s == pytest.approx(1.03, abs=0.03)
-    assert held.feedback_age_s == pytest.approx(3.03, abs=0.03)
-
-
 @pytest.mark.parametrize("seen", [{}, {"AGII": 501}, {"AGI": 7}, {"AGI": 10**9}])
 def test_feedback_that_has_not_seen_us_is_no_sign_of_life(seen: dict[str, int]) -> None:
     rig = moving()
@@ -433,30 +403,6 @@ def test_odometry_that_is_no_number_is_no_odometry() -> None:
 
 
 # --- speed limits and rings -----------------------------------------------------
-
-
-def test_a_speed_limit_for_me_halves_forward_reverse_and_turning() -> None:
-    rig = moving()
-    rig.speed_limits = {"AGI": SpeedLimit(0.5, "person", "p1", 1.4, "d-9")}
-    rig.run(0.3)
-    assert rig.twist == Twist2D(0.5, 0.2)
-    report = rig.reports[-1]
-    assert (report.reason, report.cause, report.decision_id) == ("person", "p1", "d-9")
-    rig.wished = Twist2D(-1.0, -0.4)
-    rig.run(3.0)
-    assert rig.twist == Twist2D(-0.5, -0.2)
-
-
-def test_a_robot_that_was_slowed_goes_on_slowly_until_it_is_well_outside() -> None:
-    rig = moving()
-    rig.alerts = (person(1.9),)
-    rig.run(0.5)
-    rig.alerts = (person(2.25),)
-    rig.run(5.0)
-    assert rig.factor == 0.5
-    rig.alerts = (person(2.35),)
-    rig.run(1.5)
-    assert rig.factor == 1.0
 
 
 def test_a_robot_that_drives_reports_twice_a_second_all_through_the_agent() -> None:

@@ -2,11 +2,10 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import pytest
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from iveg.domain.observations import DetectionFrame
 from iveg.robot.ros2.config import RobotConfig
@@ -193,26 +192,6 @@ def test_boxes_of_yolox_since_2022_are_read_as_those_before(
 
     assert [one.class_id for one in found] == [class_id] * count
     assert all(math.dist(one.box.centre[:2], TRUTH) <= CLOSE_M for one in found)
-
-
-def test_boxes_of_a_fork_with_other_fields_are_a_fault_by_topic_and_type() -> None:
-    @dataclass(frozen=True)
-    class Forked(d.BoundingBox):  # type: ignore[misc]
-        depth: float = 3.0
-
-    parts = {f.name: getattr(yolox_box(MIDDLE, TALL), f.name) for f in BOX_FIELDS}
-    seen = d.BoundingBoxes(OPTICAL, UNSEEN, (Forked(**parts),) * 2)
-    one = bench()
-    store = get_typestore(Stores.ROS2_JAZZY)
-    for name, text in ros.OLDER_TEXTS.items():
-        whole = text + "float64 depth\n" * name.endswith("/BoundingBox")
-        store.register(get_types_from_msg(whole, name))
-    wire = bytes(store.serialize_cdr(seen, seen.ROS))
-
-    one.inputs.hear("detections_2d", [wire], MONO, form=d.BoundingBoxes)
-
-    assert one.tick() == []
-    assert one.faults() == {"unreadable": "/boxes: bboxes_ex_msgs/BoundingBoxes"}
 
 
 def test_the_picture_that_yolox_looked_at_is_the_one_that_counts() -> None:

@@ -147,7 +147,7 @@ def test_bytes_of_another_layout_are_named() -> None:
     bench.inputs.hear("odometry", [b"\0\1\0\0short"], said.MONO)
 
     assert bench.tick() == []
-    assert bench.faults() == {"unreadable": "/odom: nav_msgs/Odometry"}
+    assert bench.faults() == {"unreadable": "/odom"}
 
 
 # --- the laser ----------------------------------------------------------------------

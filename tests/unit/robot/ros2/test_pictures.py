@@ -82,22 +82,6 @@ def grounded(bench: Bench, after: float = 0.0) -> DetectionFrame:
     return found
 
 
-def test_a_box_and_depth_become_a_box_in_map() -> None:
-    found = grounded(
-        bench()
-        .hear("depth", depth())
-        .hear("camera_info", info())
-        .hear("detections_2d", look(box()))
-    )
-
-    (one,) = found.detections
-    assert (one.class_id, one.frame_id) == ("farmer", "map")
-    assert one.box.xmin == pytest.approx(13.0, abs=0.05)
-    assert one.box.xmax == pytest.approx(13.0, abs=0.05)
-    assert 0.4 < one.box.ymax - one.box.ymin < 0.8
-    assert one.box.zmax - one.box.zmin == pytest.approx(1.3, abs=0.3)
-
-
 def test_a_mask_says_which_pixels_are_whose() -> None:
     mask = np.zeros((HEIGHT, WIDTH))
     mask[10:40, 25:33] = 1

@@ -129,7 +129,7 @@ async def test_a_second_publisher_of_the_drives_topic_makes_it_stand(
 def tell(site: Site, x: float) -> None:
     """Feedback of iVeg names a peer at this place (m)."""
     peer = Feedback("AGII", Origin("c", 1), pose=Pose2D(x, 0.0, 0.0), seen={})
-    site.robot.node.authors.apply("AGII", peer, None, None, clock.mono())
+    site.robot.node.machine.authors.apply("AGII", peer, None, None, clock.mono())
 
 
 async def test_neighbours_go_out_for_the_costmap_and_for_rviz(site: Site) -> None:
@@ -152,13 +152,14 @@ async def test_the_fleets_picture_goes_out_while_somebody_listens(site: Site) ->
     tell(site, 5.0)
 
     await until(lambda: writer.sent and (writer.said()[-1].data == 100).any())
-    grid = writer.said()[-1]
+    grid, asks = writer.said()[-1], site.robot.node.asks_for_scans
     writer.readers = 0
     await until(lambda: (writer.said()[-1].data == -1).all())
     last, before = len(writer.sent), len(site.driven)
     await until(lambda: len(site.driven) > before + 60)
 
     assert len(writer.sent) == last
+    assert (asks, site.robot.node.asks_for_scans) == (True, False)
     assert (qos.reliable, qos.transient_local, qos.depth) == (True, True, 1)
     assert grid.header.frame_id == "map"
     assert grid.data.size == grid.info.width * grid.info.height
