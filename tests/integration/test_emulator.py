@@ -24,28 +24,21 @@ from iveg.lab.emulator.world import SimulatedWorld
 from iveg.robot.node import NodeSettings
 from tests.integration.emulator_cloud import Cloud, running, until
 from tests.patience import PATIENCE_S
+from tests.ports import free_ports
 from tests.processes import NO_TLS
 
 TESTBED = load_greenhouse("mvsim-20x20")
 FLEET = ("AGI", "AGII")
 
 
-class FaultPort:
-    """Speaks to the fault port."""
-
-    def __init__(self) -> None:
-        self.port = 0
-
-    def opened(self, port: int) -> None:
-        self.port = port
-
-    async def post(self, order: object) -> httpx.Response:
-        async with httpx.AsyncClient(verify=NO_TLS, timeout=PATIENCE_S) as client:
-            return await client.post(f"http://127.0.0.1:{self.port}/", json=order)
+async def post(port: int, order: object) -> httpx.Response:
+    """Send an order to the fault port."""
+    async with httpx.AsyncClient(verify=NO_TLS, timeout=PATIENCE_S) as client:
+        return await client.post(f"http://127.0.0.1:{port}/", json=order)
 
 
 def emulator(
-    address: BrokerAddress, folder: Path, port: FaultPort | None = None
+    address: BrokerAddress, folder: Path, port: int | None = None
 ) -> asyncio.Task[None]:
     layout = lay_out(scenario_named("nlos"), FLEET, TESTBED)
     node = NodeSettings(address=address, apikey="iveg", directory=folder / "state")
@@ -53,8 +46,7 @@ def emulator(
         run_emulator(
             SimulatedWorld(TESTBED, layout, DETECTORS["perfect"], seed=1),
             FleetSettings(node),
-            fault_port=None if port is None else 0,
-            on_fault_port=(port or FaultPort()).opened,
+            fault_port=port,
         )
     )
 
@@ -86,14 +78,14 @@ async def test_robots_publish_all_that_the_contract_names_in_order_and_cleanly(
 async def test_faults_are_done_as_ordered(
     address: BrokerAddress, cloud: Cloud, tmp_path: Path
 ) -> None:
-    port = FaultPort()
+    (port,) = free_ports(1)
     async with running(emulator(address, tmp_path, port)):
         await until(lambda: cloud.speed("AGII") > 0.5)
 
-        done = await port.post({"robot": "AGII", "local_hold": "hw"})
+        done = await post(port, {"robot": "AGII", "local_hold": "hw"})
         assert done.status_code == 204
         await until(lambda: [h.source for h in cloud.report("AGII").holds] == ["hw"])
-        await port.post({"robot": "AGII", "release_locally": True})
+        await post(port, {"robot": "AGII", "release_locally": True})
         await until(lambda: not cloud.report("AGII").holds)
         await until(lambda: cloud.speed("AGII") > 0.5)
 
@@ -101,11 +93,11 @@ async def test_faults_are_done_as_ordered(
 async def test_a_deaf_robot_drives_on_whatever_its_gate_says_and_holds_still_bite(
     address: BrokerAddress, cloud: Cloud, tmp_path: Path
 ) -> None:
-    port = FaultPort()
+    (port,) = free_ports(1)
     cloud.speed_limits["AGII"] = SpeedLimit(0.5, "person", "someone", 1.0)
     async with running(emulator(address, tmp_path, port)):
         await until(lambda: cloud.speed("AGII") > 0.3)
-        await port.post({"robot": "AGII", "deaf": True})
+        await post(port, {"robot": "AGII", "deaf": True})
         await until(lambda: cloud.speed("AGII") > 0.6)
         assert cloud.report("AGII").speed_factor == 0.5
 

@@ -34,7 +34,7 @@ from iveg.lab.embedded.entities import (
     not_supported,
     write_entity,
 )
-from iveg.lab.embedded.subscriptions import Outbox, Subscription
+from iveg.lab.embedded.subscriptions import Subscription
 
 PATIENCE_S = 5.0
 Provider = Callable[[Scope, str, str, Mapping[str, object]], Awaitable[None]]
@@ -95,7 +95,6 @@ class ContextBroker:
 
     def __init__(self) -> None:
         self._tenants: dict[str, Tenant] = {}
-        self.outbox = Outbox()
         self.providers: dict[str, Provider] = {}
         self._passing: set[asyncio.Future[None]] = set()
 
@@ -105,7 +104,9 @@ class ContextBroker:
 
     def close(self) -> None:
         """Close the connections to receivers; forget commands under way."""
-        self.outbox.close()
+        for tenant in self._tenants.values():
+            for subscription in tenant.subscriptions.values():
+                subscription.close()
         for passing in self._passing:
             passing.cancel()
 
@@ -145,7 +146,7 @@ class ContextBroker:
         changed = entity.apply(changes, scope.now)
         for subscription in self.tenant(scope.service).subscriptions.values():
             if subscription.wants(entity, changed, scope.now):
-                self.outbox.post(subscription, entity, scope.now)
+                subscription.notify(entity, scope.now)
 
     # --- updates that may have to be passed on ----------------------------------
 
@@ -397,16 +398,14 @@ async def _create_subscription(call: _Call) -> Response:
 
 
 async def _change_subscription(call: _Call) -> Response:
-    subscription = _subscription(call)
-    subscription.change(load_object(call.body))
-    call.broker.outbox.forget(subscription.id)
+    _subscription(call).change(load_object(call.body))
     return Response(status_code=204)
 
 
 async def _delete_subscription(call: _Call) -> Response:
-    subscription_id = _subscription(call).id
-    del call.tenant.subscriptions[subscription_id]
-    call.broker.outbox.forget(subscription_id)
+    subscription = _subscription(call)
+    subscription.close()
+    del call.tenant.subscriptions[subscription.id]
     return Response(status_code=204)
 
 

@@ -86,7 +86,7 @@ class Endpoint(Document):
         timeout: Time limit of a response (ms); 5 s where none is given.
     """
 
-    url: str = Field(pattern=r"^https?://[^/?#]")
+    url: str = Field(pattern=r"^http://[^/?#]")
     timeout: PositiveInt | None = None
     headers: dict[str, Annotated[str, Field(pattern=r"^[^$]*$")]] | None = None
 
@@ -157,6 +157,7 @@ class Subscription:
         self.sent, self.fails, self.failure = 0, 0, ""
         self.sent_at = float("-inf")
         self._raw = raw
+        self._lanes: dict[object, Lane] = {}
 
     @property
     def receiver(self) -> Endpoint:
@@ -180,15 +181,17 @@ class Subscription:
             and any(subscribed.matches(entity) for subscribed in subject.entities)
         )
 
-    def notification_of(self, entity: Entity, now: float) -> bytes:
-        """Body of a notification that is about to be sent."""
+    def notify(self, entity: Entity, now: float) -> None:
+        """Send an entity to the receiver."""
         notification = self.document.notification
         view = EntityView(notification.attrs, notification.attrs_format == "keyValues")
         self.sent += 1
         self.sent_at = now
-        return b'{"subscriptionId":"%b","data":[%b]}' % (
-            self.id.encode(),
-            write_entity(entity, view),
+        if entity.key not in self._lanes:
+            self._lanes[entity.key] = Lane(self)
+        self._lanes[entity.key].send(
+            b'{"subscriptionId":"%b","data":[%b]}'
+            % (self.id.encode(), write_entity(entity, view))
         )
 
     def change(self, raw: Mapping[str, Any]) -> None:
@@ -199,8 +202,15 @@ class Subscription:
         """
         merged = {**self._raw, **raw}
         self.document, self._raw = _read(merged), merged
+        self.close()
         if "status" in raw:
             self.fails = 0
+
+    def close(self) -> None:
+        """Close the connections; what waits is lost."""
+        for lane in self._lanes.values():
+            lane.close()
+        self._lanes.clear()
 
     def ended(self, failure: str = "") -> None:
         """Record the end of a notification; any response counts as success."""
@@ -230,33 +240,6 @@ _LENGTH = re.compile(rb"\r\ncontent-length: *(\d+)")
 REFUSED = "Couldn't connect to server"
 TIMED_OUT = "Timeout was reached"
 CLOSED = "Server returned nothing (no headers, no data)"
-
-
-class Outbox:
-    """The lanes of all subscriptions."""
-
-    def __init__(self) -> None:
-        self._lanes: dict[str, dict[object, Lane]] = {}
-
-    def post(self, subscription: Subscription, entity: Entity, now: float) -> None:
-        """Send one entity to one subscriber."""
-        lanes = self._lanes.setdefault(subscription.id, {})
-        if entity.key not in lanes:
-            lanes[entity.key] = Lane(subscription)
-        lanes[entity.key].send(subscription.notification_of(entity, now))
-
-    def forget(self, subscription_id: str) -> None:
-        """Close the connections of a subscription that changed or is deleted.
-
-        What waits is lost.
-        """
-        for lane in self._lanes.pop(subscription_id, {}).values():
-            lane.close()
-
-    def close(self) -> None:
-        """Close every connection."""
-        for subscription_id in list(self._lanes):
-            self.forget(subscription_id)
 
 
 class Lane:
@@ -332,10 +315,7 @@ class Lane:
             self._hang_up()
         if self._streams is None:
             url = urlsplit(self._receiver.url)
-            is_tls = url.scheme == "https"
-            port = url.port or (443 if is_tls else 80)
-            streams = asyncio.open_connection(url.hostname, port, ssl=is_tls or None)
-            self._streams = await streams
+            self._streams = await asyncio.open_connection(url.hostname, url.port or 80)
         return self._streams
 
     def _hang_up(self) -> None:

@@ -8,7 +8,6 @@ them as tiles.
 """
 
 import asyncio
-import logging
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -229,12 +228,7 @@ class EmulatedRobot:
             self._node.release_locally()
 
 
-_log = logging.getLogger(__name__)
 _CLIMATE_EVERY_S = 10.0
-
-
-def _log_port(port: int) -> None:
-    _log.info("faults are taken on 127.0.0.1:%d", port)
 
 
 async def run_emulator(
@@ -242,7 +236,6 @@ async def run_emulator(
     settings: FleetSettings,
     *,
     fault_port: int | None = None,
-    on_fault_port: Callable[[int], None] = _log_port,
     network: Network | None = None,
 ) -> None:
     """Run a world in real time until cancelled.
@@ -251,8 +244,7 @@ async def run_emulator(
         world: Robots and people.
         settings: Those of all robots; the directory of the hold files is made if
             missing.
-        fault_port: Loopback port for fault orders; 0 takes a free one; None has none.
-        on_fault_port: Called with the port in use.
+        fault_port: Loopback port for fault orders; None has none.
         network: DDS: the robots are ROS 2 bases there, controlled by ``iveg robot``;
             topics are below ``/`` and the robot's id in lower case.
 
@@ -263,8 +255,7 @@ async def run_emulator(
     if fault_port is None:
         await fleet.run()
         return
-    async with open_fault_port(fault_port, fleet.obey) as port:
-        on_fault_port(port)
+    async with open_fault_port(fault_port, fleet.obey):
         await fleet.run()
 
 

@@ -66,15 +66,8 @@ Obey = Callable[[FaultOrder], str | None]
 
 
 @asynccontextmanager
-async def open_fault_port(port: int, obey: Obey) -> AsyncIterator[int]:
+async def open_fault_port(port: int, obey: Obey) -> AsyncIterator[None]:
     """Accept orders while the block lasts.
-
-    Args:
-        port: 0 takes a free one.
-        obey: Executes an order.
-
-    Yields:
-        The port.
 
     Raises:
         SettingsError: the port is in use.
@@ -90,11 +83,11 @@ async def open_fault_port(port: int, obey: Obey) -> AsyncIterator[int]:
     async with AsyncExitStack() as stack:
         listener = post_listener(answer, "127.0.0.1", port)
         try:
-            bound = await stack.enter_async_context(listener)
+            await stack.enter_async_context(listener)
         except OSError as error:
             allowed = "a port of 127.0.0.1 that nobody listens on"
             raise SettingsError("fault_port", str(port), allowed) from error
-        yield bound
+        yield
 
 
 def read_order(body: bytes) -> FaultOrder:

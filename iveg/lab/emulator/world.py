@@ -265,11 +265,10 @@ def true_picture(
     """The truth of one picture.
 
     ``{"robot", "at": Unix s, "pose": {"x", "y", "yaw"}, "speed", "wanted", "factor",
-    "visible": [{"key", "class", "x", "y", "part"}], "people": [{"key", "x", "y",
-    "hidden"}]}``: the robot's true pose in ``map`` (m, rad) and speed (m/s),
-    ``Driving``, all targets of which a part (0 to 1) is in its view, and every person
-    in the greenhouse, by their true positions, whatever the detector reports;
-    ``hidden``: crop or crates are between this robot's ``base_link`` and the person.
+    "visible": [{"key", "class", "x", "y", "part"}], "people": [{"key", "x", "y"}]}``:
+    the robot's true pose in ``map`` (m, rad) and speed (m/s), ``Driving``, all targets
+    of which a part (0 to 1) is in its view, and every person in the greenhouse, by
+    their true positions, whatever the detector reports.
 
     Args:
         rig: The robot whose picture it is.
@@ -298,7 +297,6 @@ def true_picture(
             {
                 "key": f"person-{number}",
                 **_place(disc),
-                "hidden": world.scenery.hides(pose.x, pose.y, disc.x, disc.y),
             }
             for number, disc in enumerate(world.discs())
         ],

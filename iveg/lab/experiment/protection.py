@@ -21,15 +21,15 @@ from itertools import groupby
 from math import dist, inf
 from operator import attrgetter, itemgetter
 from statistics import quantiles
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.records import Json
 from iveg.lab.experiment.stage import Row
 
-Sight = Literal["in_view", "behind_plants", "unseen"]
-"""In view of some camera; hidden from the robot that is near; neither."""
-SIGHTS: Final[tuple[Sight, ...]] = ("in_view", "behind_plants", "unseen")
+Sight = Literal["in_view", "unseen"]
+"""Whether in view of some camera."""
+SIGHTS: Final[tuple[Sight, ...]] = get_args(Sight)
 NEAR_M = 2.0
 """The zone of the rule (m)."""
 AWAY_M = 4.0
@@ -213,9 +213,7 @@ def _people(row: Row, in_view: set[str], places: Sequence[Row]) -> Iterator[Near
     here = row["pose"]["x"], row["pose"]["y"]
     for person in row["people"]:
         key, there = person["key"], (person["x"], person["y"])
-        sight: Sight = "behind_plants" if person["hidden"] else "unseen"
-        if key in in_view:
-            sight = "in_view"
+        sight: Sight = "in_view" if key in in_view else "unseen"
         yield NearPerson(key, dist(here, there), sight, key in foretold)
 
 

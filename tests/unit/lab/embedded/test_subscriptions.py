@@ -15,7 +15,6 @@ from iveg.lab.embedded.subscriptions import (
     MOST_WAITING,
     TIMED_OUT,
     Lane,
-    Outbox,
     Subscription,
 )
 from tests.patience import PATIENCE_S
@@ -108,14 +107,14 @@ async def test_each_entity_has_a_connection_on_which_its_values_keep_their_order
             writer.write(OK)
 
     async with receiver(talk) as port:
-        to, outbox = Subscribed(port), Outbox()
+        to = Subscribed(port)
         for value in range(100):
             for name in ("AGI", "AGII"):
                 entity = Entity(name, "Robot", "/")
                 entity.apply({"n": Attribute("Number", value)}, 0.0)
-                outbox.post(to, entity, 0.0)
+                to.notify(entity, 0.0)
         assert set(await to.failures(200)) == {""}
-        outbox.close()
+        to.close()
     assert sorted(received.values()) == [
         [(name, value) for value in range(100)] for name in ("AGI", "AGII")
     ]

@@ -30,8 +30,8 @@ CHOSEN = {"confidence_threshold": 0.8}
 GUARDED = Protection(
     100.0,
     10.0,
-    defaultdict(float, {"in_view": 8.0, "behind_plants": 4.0}),
-    defaultdict(float, {"in_view": 7.0, "behind_plants": 1.0}),
+    defaultdict(float, {"in_view": 8.0, "unseen": 4.0}),
+    defaultdict(float, {"in_view": 7.0, "unseen": 1.0}),
     [0.0, 0.4, None],
     [Entry(0.5, 2.0), Entry(0.9, None)],
 )
@@ -96,7 +96,7 @@ def test_the_report_says_who_was_protected_by_detector_and_rule() -> None:
     # The scenarios' own run; that by the paper's rule is for comparison.
     assert "for 87.5% of the time (66.7% with" in page
     assert "in 1 of 3 encounters never" in page
-    near = "<td>8.0</td><td>87.5%</td><td>4.0</td><td>25.0%</td><td>0.0</td><td>–</td>"
+    near = "<td>8.0</td><td>87.5%</td><td>4.0</td><td>25.0%</td>"
     encounters = "<td>3</td><td>1</td><td>0.38</td><td>10.0%</td>"
     entries = "<td>2</td><td>50.0%</td><td>50.0%</td>"
     for where, rule in (
