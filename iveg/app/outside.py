@@ -1,7 +1,6 @@
 """Ports of the server to the world outside its process: network and disk."""
 
 import logging
-from dataclasses import dataclass
 from pathlib import Path
 
 from pydantic import TypeAdapter
@@ -41,24 +40,40 @@ _OUT = TypeAdapter(tuple[str, OutOfService])
 _WORD = TypeAdapter(tuple[str, WordAnswer])
 
 
-@dataclass(frozen=True, slots=True)
 class Stores:
     """Storage that outlives a restart: the history and the files beside it.
 
-    Attributes:
-        directory: Of the files: beside the database where that is a file.
+    A missing directory is created; nothing is connected yet.
     """
 
-    directory: Path
-    recorder: Recorder
-    queries: Queries
-    journal: FileJournal
-    rules: FileRules
-    detectors: FileByRobot[OutOfService]
-    words: FileByRobot[WordAnswer]
-    trials: FileTrials
-    access: AccessFile
-    inputs: InputRecorder
+    def __init__(
+        self, settings: Settings, data_directory: Path, fleet: FleetDescription
+    ) -> None:
+        url = history_url(settings.database_url, data_directory)
+        self.directory = directory = files_of(url, data_directory)
+        directory.mkdir(parents=True, exist_ok=True)
+        if (revoked := directory / "revoked.jsonl").exists():
+            says = "%s counts no more: set IVEG_REFUSED_ROBOTS, delete it"
+            _log.warning(says, revoked)
+        spilled = spilled_file(url, directory)
+        self.journal = FileJournal(directory / "commands.jsonl", spilled)
+        self.recorder, self.queries = Recorder(url, self.journal), Queries(url)
+        self.rules = FileRules(directory / "rules.jsonl")
+        self.trials = FileTrials(directory / "trial.jsonl")
+        self.detectors = FileByRobot(directory / "detectors.jsonl", "detectors", _OUT)
+        self.words = FileByRobot(directory / "words.jsonl", "words", _WORD)
+        self.access = AccessFile(directory / ACCOUNTS)
+        self.inputs = InputRecorder(
+            WriterSetup(
+                (directory / "recordings").resolve(),
+                limits=settings.limits_of_recordings(settings.keep_recordings_gb),
+                pictures=settings.limits_of_recordings(settings.keep_pictures_gb),
+                apikey=settings.apikey,
+                robots=fleet.ids,
+            ),
+            clock.now,
+            is_on=settings.recordings,
+        )
 
     def history_state(self) -> HopState:
         """State of the history."""
@@ -92,7 +107,6 @@ class Stores:
         self.journal.close()
 
 
-@dataclass(frozen=True, slots=True)
 class Outside:
     """Everything outside the process that the server needs.
 
@@ -101,11 +115,19 @@ class Outside:
         provider: Vouches for people; None: nobody does.
     """
 
-    stores: Stores
-    link: MqttLink
-    orion: OrionClient
-    agent: IotAgentClient
-    provider: IdentityProvider | None = None
+    def __init__(
+        self, settings: Settings, data_directory: Path, fleet: FleetDescription
+    ) -> None:
+        self.stores = Stores(settings, data_directory, fleet)
+        broker = BrokerAddress.from_url(
+            settings.mqtt_url,
+            settings.mqtt_user,
+            settings.mqtt_password,
+            TlsFiles(settings.mqtt_ca, settings.mqtt_cert, settings.mqtt_key),
+        )
+        self.link = MqttLink(broker, "iveg")
+        self.orion, self.agent = open_fiware(settings)
+        self.provider = open_provider(settings)
 
     async def close(self) -> None:
         """Close all but the link, which ends with its task."""
@@ -116,64 +138,10 @@ class Outside:
             await self.provider.close()
 
 
-def open_outside(
-    settings: Settings, data_directory: Path, fleet: FleetDescription
-) -> Outside:
-    """Open the ports that the settings name; nothing is connected yet."""
-    orion, agent = open_fiware(settings)
-    broker = BrokerAddress.from_url(
-        settings.mqtt_url,
-        settings.mqtt_user,
-        settings.mqtt_password,
-        TlsFiles(settings.mqtt_ca, settings.mqtt_cert, settings.mqtt_key),
-    )
-    return Outside(
-        open_stores(settings, data_directory, fleet),
-        MqttLink(broker, "iveg"),
-        orion,
-        agent,
-        open_provider(settings),
-    )
-
-
 def files_of(url: str, data_directory: Path) -> Path:
     """Folder of the files beside a history: beside its own where that is one."""
     database = sqlite_file(url)
     return data_directory if database is None else database.parent
-
-
-def open_stores(
-    settings: Settings, data_directory: Path, fleet: FleetDescription
-) -> Stores:
-    """Open the stores; a missing directory is created."""
-    url = history_url(settings.database_url, data_directory)
-    directory = files_of(url, data_directory)
-    directory.mkdir(parents=True, exist_ok=True)
-    if (revoked := directory / "revoked.jsonl").exists():
-        _log.warning("%s counts no more: set IVEG_REFUSED_ROBOTS, delete it", revoked)
-    journal = FileJournal(directory / "commands.jsonl", spilled_file(url, directory))
-    return Stores(
-        directory,
-        Recorder(url, journal),
-        Queries(url),
-        journal,
-        FileRules(directory / "rules.jsonl"),
-        FileByRobot(directory / "detectors.jsonl", "detectors", _OUT),
-        FileByRobot(directory / "words.jsonl", "words", _WORD),
-        FileTrials(directory / "trial.jsonl"),
-        AccessFile(directory / ACCOUNTS),
-        InputRecorder(
-            WriterSetup(
-                (directory / "recordings").resolve(),
-                limits=settings.limits_of_recordings(settings.keep_recordings_gb),
-                pictures=settings.limits_of_recordings(settings.keep_pictures_gb),
-                apikey=settings.apikey,
-                robots=fleet.ids,
-            ),
-            clock.now,
-            is_on=settings.recordings,
-        ),
-    )
 
 
 def open_provider(settings: Settings) -> IdentityProvider | None:
