@@ -36,7 +36,7 @@ from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.adapters.worker import PACK_LIMIT_S, Worker
 from iveg.app.accounts import PART as ACCOUNTS
 from iveg.app.accounts import Accounts
-from iveg.app.outside import Outside, open_outside, site_of
+from iveg.app.outside import Outside, site_of
 from iveg.comfort.equipment import PART as EQUIPMENT
 from iveg.comfort.equipment import TICK_S as EQUIPMENT_TICK_S
 from iveg.comfort.maps import COVERAGE_TICK_S, SCAN_TICK_S
@@ -374,7 +374,7 @@ def open_dss(
     fleet = load_fleet(settings.fleet, settings.robots)
     if unknown := sorted({*settings.refused_robots} - {*fleet.ids}):
         raise SettingsError("IVEG_REFUSED_ROBOTS", unknown[0], "robots of the fleet")
-    outside = open_outside(settings, data_directory)
+    outside = Outside(settings, data_directory)
     return make(settings, fleet, outside, demo=demo)
 
 

@@ -1,7 +1,6 @@
 """Ports of the server to the world outside its process: network and disk."""
 
 import logging
-from dataclasses import dataclass
 from pathlib import Path
 
 from pydantic import TypeAdapter
@@ -38,23 +37,29 @@ _OUT = TypeAdapter(tuple[str, OutOfService])
 _WORD = TypeAdapter(tuple[str, WordAnswer])
 
 
-@dataclass(frozen=True, slots=True)
 class Stores:
     """Storage that outlives a restart: the history and the files beside it.
 
-    Attributes:
-        directory: Of the files: beside the database where that is a file.
+    A missing directory is created; nothing is connected yet.
     """
 
-    directory: Path
-    recorder: Recorder
-    queries: Queries
-    journal: FileJournal
-    rules: FileRules
-    detectors: FileByRobot[OutOfService]
-    words: FileByRobot[WordAnswer]
-    access: AccessFile
-    inputs: InputRecorder
+    def __init__(self, settings: Settings, data_directory: Path) -> None:
+        url = history_url(settings.database_url, data_directory)
+        self.directory = directory = files_of(url, data_directory)
+        directory.mkdir(parents=True, exist_ok=True)
+        if (revoked := directory / "revoked.jsonl").exists():
+            says = "%s counts no more: set IVEG_REFUSED_ROBOTS, delete it"
+            _log.warning(says, revoked)
+        spilled = spilled_file(url, directory)
+        self.journal = FileJournal(directory / "commands.jsonl", spilled)
+        self.recorder, self.queries = Recorder(url, self.journal), Queries(url)
+        self.rules = FileRules(directory / "rules.jsonl")
+        self.detectors = FileByRobot(directory / "detectors.jsonl", "detectors", _OUT)
+        self.words = FileByRobot(directory / "words.jsonl", "words", _WORD)
+        self.access = AccessFile(directory / ACCOUNTS)
+        self.inputs = InputRecorder(
+            directory / "recordings", clock.now, settings.limits_of_recordings
+        )
 
     def history_state(self) -> HopState:
         """State of the history."""
@@ -78,7 +83,6 @@ class Stores:
         self.journal.close()
 
 
-@dataclass(frozen=True, slots=True)
 class Outside:
     """Everything outside the process that the server needs.
 
@@ -87,11 +91,17 @@ class Outside:
         provider: Vouches for people; None: nobody does.
     """
 
-    stores: Stores
-    link: MqttLink
-    orion: OrionClient
-    agent: IotAgentClient
-    provider: IdentityProvider | None = None
+    def __init__(self, settings: Settings, data_directory: Path) -> None:
+        self.stores = Stores(settings, data_directory)
+        broker = BrokerAddress.from_url(
+            settings.mqtt_url,
+            settings.mqtt_user,
+            settings.mqtt_password,
+            TlsFiles(settings.mqtt_ca, settings.mqtt_cert, settings.mqtt_key),
+        )
+        self.link = MqttLink(broker, "iveg")
+        self.orion, self.agent = open_fiware(settings)
+        self.provider = open_provider(settings)
 
     async def close(self) -> None:
         """Close all but the link, which ends with its task."""
@@ -102,51 +112,10 @@ class Outside:
             await self.provider.close()
 
 
-def open_outside(settings: Settings, data_directory: Path) -> Outside:
-    """Open the ports that the settings name; nothing is connected yet."""
-    orion, agent = open_fiware(settings)
-    broker = BrokerAddress.from_url(
-        settings.mqtt_url,
-        settings.mqtt_user,
-        settings.mqtt_password,
-        TlsFiles(settings.mqtt_ca, settings.mqtt_cert, settings.mqtt_key),
-    )
-    return Outside(
-        open_stores(settings, data_directory),
-        MqttLink(broker, "iveg"),
-        orion,
-        agent,
-        open_provider(settings),
-    )
-
-
 def files_of(url: str, data_directory: Path) -> Path:
     """Folder of the files beside a history: beside its own where that is one."""
     database = sqlite_file(url)
     return data_directory if database is None else database.parent
-
-
-def open_stores(settings: Settings, data_directory: Path) -> Stores:
-    """Open the stores; a missing directory is created."""
-    url = history_url(settings.database_url, data_directory)
-    directory = files_of(url, data_directory)
-    directory.mkdir(parents=True, exist_ok=True)
-    if (revoked := directory / "revoked.jsonl").exists():
-        _log.warning("%s counts no more: set IVEG_REFUSED_ROBOTS, delete it", revoked)
-    journal = FileJournal(directory / "commands.jsonl", spilled_file(url, directory))
-    return Stores(
-        directory,
-        Recorder(url, journal),
-        Queries(url),
-        journal,
-        FileRules(directory / "rules.jsonl"),
-        FileByRobot(directory / "detectors.jsonl", "detectors", _OUT),
-        FileByRobot(directory / "words.jsonl", "words", _WORD),
-        AccessFile(directory / ACCOUNTS),
-        InputRecorder(
-            directory / "recordings", clock.now, settings.limits_of_recordings
-        ),
-    )
 
 
 def open_provider(settings: Settings) -> IdentityProvider | None:

@@ -4,7 +4,7 @@ import asyncio
 import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import httpx
@@ -15,7 +15,7 @@ from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.recorder import Recorder
 from iveg.adapters.journal import FileJournal
 from iveg.app.dss import Dss
-from iveg.app.outside import Outside, open_outside
+from iveg.app.outside import Outside
 from iveg.asgi import create_app
 from iveg.domain.records import Record
 from iveg.domain.transports import DIRECT, FIWARE, Transport
@@ -91,11 +91,10 @@ def whole_server(folder: Path) -> Iterator[WholeServer]:
     lay_history(url)
     chosen = Settings(api_token=API_TOKEN)
     fleet = load_fleet(chosen.fleet, chosen.robots)
-    real = open_outside(chosen, folder)
-    recorder = _Recorder(url, folder)
-    parts = {one.name: getattr(real, one.name) for one in fields(real)}
-    parts["stores"] = replace(real.stores, recorder=recorder)
-    dss = _Dss(chosen, fleet, Outside(**parts))
+    outside = Outside(chosen, folder)
+    real, recorder = outside.stores.recorder, _Recorder(url, folder)
+    outside.stores.recorder = recorder
+    dss = _Dss(chosen, fleet, outside)
     dss.worker = dss.packer = FakeWorker()  # type: ignore[assignment]
     dss.web = replace(dss.web, worker=FakeWorker())
     app = create_app(dss)
@@ -107,7 +106,7 @@ def whole_server(folder: Path) -> Iterator[WholeServer]:
         )
         runner.run(client.aclose())
         runner.run(dss.outside.close())
-        runner.run(real.stores.recorder.close())
+        runner.run(real.close())
 
 
 def _headers_of_roles(app: FastAPI) -> dict[str, dict[str, str]]:
