@@ -223,15 +223,6 @@ def test_one_moving_sample_starts_the_standstill_anew(turn: dict[str, float]) ->
     assert bench.state == "DELIVERED"
 
 
-def test_reports_without_our_hold_are_no_standstill() -> None:
-    bench = pressed()
-    for _ in range(30):
-        bench.report(RED_BUTTON)
-        bench.wait(0.1)
-
-    assert bench.state == "UNCONFIRMED"
-
-
 def test_fresh_odometry_that_moves_contradicts_the_report() -> None:
     bench = pressed()
     for _ in range(30):
@@ -253,17 +244,6 @@ def test_the_time_to_standstill_is_that_of_the_first_standing_sample() -> None:
 
     assert bench.stop.standstill_ms == pytest.approx(500.0)
     assert bench.stop.times.standing == at(0.5)
-
-
-def test_an_answer_or_a_status_alone_never_means_standing() -> None:
-    bench = pressed()
-    for _ in range(100):
-        bench.answer()
-        bench.sent(DIRECT.id)
-        bench.sent(FIWARE.id)
-        bench.wait(0.05)
-
-    assert bench.state == "STILL_MOVING"
 
 
 def test_a_standing_robot_is_reminded_every_five_seconds() -> None:
@@ -312,28 +292,7 @@ def test_standing_without_a_report_for_a_second_and_a_half_is_stale() -> None:
     assert sends(effects, "direct")
 
 
-def test_a_stale_robot_must_stand_a_second_before_it_is_believed() -> None:
-    bench = standing()
-    bench.wait(5.0)
-
-    bench.report(bench.ours)
-    assert bench.state == "STALE"
-    bench.stand()
-
-    assert bench.state == "STANDING"
-
-
 # --- people -----------------------------------------------------------------------
-
-
-def test_a_second_press_of_the_same_person_sends_again_at_once() -> None:
-    bench = pressed()
-    bench.wait(0.1)
-
-    effects = bench.press()
-
-    assert [one.transport for one in sends(effects)] == ["direct"]
-    assert bench.changes() == ["requested"]
 
 
 def test_how_far_it_may_have_driven_grows_with_its_last_speed() -> None:

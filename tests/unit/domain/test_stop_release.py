@@ -147,16 +147,6 @@ def test_the_refusal_of_one_copy_ends_nothing_while_another_may_act() -> None:
     assert bench.state == "READY"
 
 
-def test_a_refusal_that_comes_after_the_report_ends_it_at_once() -> None:
-    bench = releasing()
-    bench.report(bench.ours, challenge=NEXT_CHALLENGE)
-    assert bench.state == "RELEASING"
-
-    bench.answer("REFUSED", why="challenge", attempt=bench.attempt)
-
-    assert bench.state == "STANDING"
-
-
 @pytest.mark.parametrize("result", ["RELEASED", "RESUMED", "REFUSED"])
 @pytest.mark.parametrize("attempt", ["", "01OTHER"])
 def test_an_answer_that_does_not_name_the_attempt_is_none_of_it(
@@ -184,15 +174,6 @@ def test_an_unconfirmed_release_keeps_the_hold_that_a_later_report_shows() -> No
     assert {one.hold_id for one in sends(effects)} == {held.id}
     assert bench.machine.hold_id == held.id
     assert bench.machine.stop is not before
-
-
-def test_a_press_during_a_release_of_three_adds_no_fourth() -> None:
-    bench = of_three()
-
-    effects = bench.press("ben")
-
-    assert bench.state == "REQUESTED"
-    assert {one.hold_id for one in sends(effects)} == {THREE[-1].id}
 
 
 def test_a_hold_in_doubt_that_was_lifted_after_all_is_replaced_at_once() -> None:
@@ -270,15 +251,6 @@ def test_f37_a_stop_during_a_release_wins() -> None:
     assert levels(bench.log)[-1] == "stopped"
 
 
-def test_the_late_result_of_a_stop_is_not_taken_for_that_of_a_release() -> None:
-    bench = releasing()
-
-    bench.sent(DIRECT.id)
-
-    assert bench.once.times.sent.get(DIRECT.id) is None
-    assert bench.once.transports[DIRECT.id] == "pending"
-
-
 def test_a_held_robot_that_iveg_did_not_stop_can_be_released() -> None:
     bench = Bench()
     bench.report(BOOT_HOLD)
@@ -287,18 +259,6 @@ def test_a_held_robot_that_iveg_did_not_stop_can_be_released() -> None:
     bench.report(released=(BOOT_HOLD.id,))
 
     assert bench.state == "READY"
-
-
-def test_such_a_release_that_is_refused_ends_where_it_began() -> None:
-    bench = Bench()
-    bench.report(BOOT_HOLD)
-    bench.release(BOOT_HOLD.id)
-
-    bench.answer("REFUSED", id=BOOT_HOLD.id, why="challenge")
-    bench.report(BOOT_HOLD, challenge=NEXT_CHALLENGE)
-
-    assert bench.state == "RUNNING"
-    assert not bench.machine.wants_stop
 
 
 # --- READY, RUNNING ---------------------------------------------------------------
@@ -362,14 +322,6 @@ def test_an_adopted_hold_that_somebody_here_asks_for_too_is_stopped_again() -> N
 
     assert bench.state == "REQUESTED"
     assert bench.ours.id != "01OTHER"
-
-
-def test_a_boot_hold_alone_is_not_adopted() -> None:
-    bench = Bench()
-
-    bench.report(BOOT_HOLD)
-
-    assert bench.state == "RUNNING"
 
 
 def closed(effects: list[Effect]) -> dict[str, tuple[str, str]]:

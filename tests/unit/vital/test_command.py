@@ -8,7 +8,6 @@ from iveg.domain.observations import Hold
 from iveg.domain.records import CommandEventRecord, CommandRecord
 from iveg.domain.stop import STEPS, DesiredRecord, FollowedCommand, StopMachine
 from iveg.domain.transports import DIRECT, FIWARE
-from tests.builders import safety_report
 from tests.fakes.records import command_record
 from tests.unit.vital.desk import Desk, conditions_of, settle
 
@@ -79,16 +78,6 @@ async def test_a_transport_that_fails_is_shown_and_tried_again() -> None:
     assert len(desk.broker.asked) == 2
 
 
-async def test_one_request_to_orion_is_in_flight() -> None:
-    desk = Desk()
-    desk.broker.opened.clear()
-    await press(desk)
-    await desk.wait(10.0)
-
-    assert desk.broker.most == 1
-    await desk.commander.close()
-
-
 async def test_a_failure_nobody_thought_of_is_logged_and_the_transport_is_tried_again(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
@@ -102,25 +91,6 @@ async def test_a_failure_nobody_thought_of_is_logged_and_the_transport_is_tried_
     assert "nobody thought of this" in caplog.text
 
 
-async def test_without_the_direct_transport_only_orion_is_asked() -> None:
-    desk = Desk(direct=False)
-
-    await press(desk)
-    await desk.wait(1.0)
-
-    assert desk.fleet.stops == []
-    assert len(desk.broker.asked) == 1
-
-
-async def test_i3_204_from_orion_and_a_puback_are_no_evidence() -> None:
-    desk = Desk()
-
-    command = await press(desk)
-    await desk.wait(5.0)
-
-    assert desk.now(command).state == "UNCONFIRMED"
-
-
 async def test_f41_reports_with_an_old_number_do_not_keep_it_standing() -> None:
     desk = Desk()
     command = await press(desk)
@@ -131,16 +101,6 @@ async def test_f41_reports_with_an_old_number_do_not_keep_it_standing() -> None:
         await desk.wait(0.1)
 
     assert desk.now(command).state == "STALE"
-
-
-async def test_what_was_asked_of_orion_says_nothing_about_stop() -> None:
-    desk = Desk()
-    command = await press(desk)
-    held = Hold(command.command_id, "iveg", "remote")
-    desk.report("AGII")
-    desk.hear(safety_report("AGI", held, origin=desk.next_origin()), asked=True)
-
-    assert desk.now(command).state == "SENT"
 
 
 @pytest.mark.parametrize(
@@ -291,32 +251,6 @@ async def test_the_journal_says_run_only_after_the_robot_reported_the_release() 
     assert desk.fleet.levels[-1] == ("AGI", "run", ())
 
 
-async def test_an_unconfirmed_release_is_written_down_as_stopped() -> None:
-    desk = Desk()
-    command = await press(desk)
-    await desk.stand()
-    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
-
-    await desk.wait(2.2)
-
-    assert desk.journal.lines[-1][1] == "stopped"
-    assert desk.journal.lines[-1][2] != command.command_id
-
-
-async def test_a_resume_goes_once_on_each_transport() -> None:
-    desk = Desk()
-    await released(desk)
-
-    once = await desk.commander.resume("AGI", "ana", desk.clock())
-    await desk.wait(1.9)
-
-    order = ("resume", "AGI", ())
-    assert [one for one in desk.broker.asked if one[0] == "resume"] == [order]
-    assert [one for one in desk.fleet.asked if one[0] == "resume"] == [order]
-    assert desk.fleet.orders[-1] == desk.broker.orders[-1]
-    assert desk.fleet.orders[-1][1] == once.command_id
-
-
 async def test_a_restart_asserts_a_hold_again_that_no_release_ever_named() -> None:
     desk = Desk()
 
@@ -330,42 +264,6 @@ async def test_a_restart_asserts_a_hold_again_that_no_release_ever_named() -> No
     assert desk.sentences() == ["log.stop.reasserted", "log.stop.sent"]
     assert machine.stop is not None
     assert machine.stop.command_id != "01HELD"
-
-
-@pytest.mark.parametrize(
-    "wanted",
-    [
-        DesiredRecord("ana"),
-        DesiredRecord("ana", "01HELD", named=("01HELD",), asked=("01HELD",)),
-    ],
-)
-async def test_a_restart_never_asserts_a_hold_that_a_release_may_have_named(
-    wanted: DesiredRecord,
-) -> None:
-    desk = Desk()
-
-    desk.commander.restore({"AGI": wanted}, desk.clock())
-    await settle()
-
-    ((_, asserted),) = desk.fleet.stops
-    assert asserted != "01HELD"
-    assert desk.journal.lines == [("AGI", "stopped", asserted, "ana")]
-
-
-async def test_a_restart_among_three_holds_that_were_named_waits_for_the_robot() -> (
-    None
-):
-    desk = Desk()
-    three = ("01A", "01B", "01C")
-    wanted = DesiredRecord("ana", "01C", three, three, "0123456789abcdef")
-
-    desk.commander.restore({"AGI": wanted}, desk.clock())
-    await desk.wait(0.9)
-    before = {hold for _, hold in desk.fleet.stops}
-    await desk.wait(0.2)
-
-    assert before == {"01C"}
-    assert desk.fleet.stops[-1][1] not in three
 
 
 async def test_what_a_crash_left_open_is_closed_and_says_what_became_of_it() -> None:

@@ -6,7 +6,6 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.observations import FeedbackRef, HeartbeatProbe, Hold, Origin
-from iveg.domain.stop import DesiredRecord
 from iveg.domain.transports import FIWARE
 from tests.builders import odometry, origin, safety_report
 from tests.unit.vital.desk import Desk, conditions_of
@@ -95,23 +94,6 @@ def stops(desk: Desk) -> list[str]:
     return asked + [key for key in desk.sentences() if key.startswith("log.stop")]
 
 
-async def test_after_a_restart_the_reports_of_an_earlier_boot_stop_nobody() -> None:
-    desk = await restarted()
-    before = Robot(desk, "boot-a", heard=EARLIER_IVEG)
-    for _ in range(20):
-        before.report(BEFORE, age_s=200.0)
-        await desk.wait(0.1)
-    present = Robot(desk, "boot-b")
-
-    for _ in range(20):
-        present.report(released=(BEFORE.id,), linear=0.4)
-        before.report(BEFORE, age_s=200.0)
-        await desk.wait(0.1)
-
-    assert (state(desk), stops(desk)) == ("RUNNING", [])
-    assert stop_alerts(desk) == []
-
-
 async def test_a_hold_that_iveg_forgot_is_adopted_from_the_first_young_report() -> None:
     desk = await restarted()
     unproven = Robot(desk, "boot-a", heard=EARLIER_IVEG)
@@ -151,28 +133,3 @@ async def test_of_a_robot_that_does_not_echo_the_estimate_must_be_young(
     Robot(desk, "boot-a", echoes=False).report(BEFORE)
 
     assert state(desk) == then
-
-
-@pytest.mark.parametrize("earlier_iveg", [EARLIER_IVEG, None])
-@pytest.mark.parametrize("held", [(), (BEFORE,)])
-async def test_a_robot_that_stands_did_not_move_by_the_word_of_an_earlier_boot(
-    earlier_iveg: FeedbackRef | None, held: tuple[Hold, ...]
-) -> None:
-    desk = await restarted()
-    told = desk.fleet.told[-1].origin
-    heard = earlier_iveg or FeedbackRef(told.boot or "", told.seq or 0)
-    before = Robot(desk, "boot-a", heard=heard)
-    await desk.wait(0.5)
-    desk.commander.restore({"AGI": DesiredRecord("ana", BEFORE.id)}, desk.clock())
-    present = Robot(desk, "boot-b")
-    await present.hold(2.0)
-    stood, ours = state(desk), hold_id(desk)
-
-    for _ in range(30):
-        before.report(*held, linear=0.4)
-        before.drive(0.4)
-        await present.hold(0.1)
-
-    assert (stood, state(desk)) == ("STANDING", "STANDING")
-    assert hold_id(desk) == ours
-    assert "log.stop.moved" not in desk.sentences()
