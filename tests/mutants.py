@@ -99,7 +99,7 @@ MUTANTS = (
     ),
     Mutant(
         "rule: what the laser sees near a robot slows nobody",
-        "return self.size_m <= _LARGEST_M or self.has_moved",
+        "return self.size_m <= _LARGEST_M or self.way_m > _MOVED_M",
         "return False",
         ("unit/domain/test_witness.py", "unit/robot/test_safety.py"),
     ),

@@ -25,16 +25,13 @@ from iveg.domain.observations import LaserScan
 
 LASTS_S = 0.2
 """Anything shorter is noise, or an insect."""
+_Place = tuple[float, float]
 _LARGEST_M = 1.0
 """Two people side by side; what is larger is counted once it moves."""
 _MOVED_M = 0.4
-_SMOOTHED_S = 0.4
 _WALKED_M, _WALKED_S, _PASSED_M = 0.5, 0.5, 0.3
 """Least way, time, and way as seen from the robot, of somebody who walks: more than of
 what it tows, or of the part of a wall that it sees as it passes."""
-_WALKS_M_S = (0.3, 2.5)
-_STANDS_S = 10.0
-"""Somebody who walked and stands since counts for as long as a zone lasts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,79 +39,50 @@ class Obstacle:
     """Something of a person's size near a robot that nobody explained.
 
     Attributes:
-        x: Its middle in ``map`` (m); ``y`` likewise.
-        first_x: Where it was when it was seen first; ``first_y`` likewise.
+        place: Its middle in ``map`` (m); ``first`` where it was when it was seen first.
+        beside: The same in the robot's ``base_link`` (m); ``first_beside`` likewise.
         size_m: From its first return to its last.
         gap_m: From the robot's outline to its nearest return.
-        first_seen: Where that was in the robot's ``base_link`` (m).
         since: When it was seen first; ``at`` newest (monotonic, s).
-        vx: How it goes in ``map`` (m/s), smoothed over 0.4 s; ``vy`` likewise.
-        passed_m: How far from where the robot saw it first, as seen from the robot (m).
-        walked_at: When it last moved like somebody who walks (monotonic, s).
+        walked: Whether it moved like somebody who walks.
     """
 
-    x: float
-    y: float
-    first_x: float
-    first_y: float
+    place: _Place
+    first: _Place
+    beside: _Place
+    first_beside: _Place
     size_m: float
     gap_m: float
     since: float
     at: float
-    first_seen: tuple[float, float]
-    vx: float = 0.0
-    vy: float = 0.0
-    passed_m: float = 0.0
-    walked_at: float = -math.inf
+    walked: bool = False
+
+    def seen_again(self, found: "Obstacle") -> "Obstacle":
+        """The obstacle with what a later scan found of it."""
+        seen = replace(
+            found, first=self.first, first_beside=self.first_beside, since=self.since
+        )
+        return replace(seen, walked=self.walked or seen.walks)
 
     @property
     def way_m(self) -> float:
         """Distance from where it was seen first (m)."""
-        return math.hypot(self.x - self.first_x, self.y - self.first_y)
-
-    @property
-    def has_moved(self) -> bool:
-        """Whether it went farther than noise does."""
-        return self.way_m > _MOVED_M
-
-    @property
-    def is_somebody(self) -> bool:
-        """Whether it walks, or walked just now."""
-        return self.at - self.walked_at <= _STANDS_S
+        return math.dist(self.place, self.first)
 
     @property
     def walks(self) -> bool:
-        """Whether it moves like somebody who walks."""
-        least, most = _WALKS_M_S
+        """Whether it went like somebody who walks."""
         return (
             self.size_m <= _LARGEST_M
             and self.at - self.since >= _WALKED_S - 1e-6
             and self.way_m >= _WALKED_M
-            and self.passed_m >= _PASSED_M
-            and least <= math.hypot(self.vx, self.vy) <= most
+            and math.dist(self.beside, self.first_beside) >= _PASSED_M
         )
-
-    def seen_again(self, found: "Obstacle") -> "Obstacle":
-        """The obstacle with what a later scan found of it."""
-        after_s = found.at - self.at
-        gain, apart_s = after_s / (_SMOOTHED_S + after_s), max(after_s, 1e-3)
-        seen = replace(
-            self,
-            x=found.x,
-            y=found.y,
-            size_m=found.size_m,
-            gap_m=found.gap_m,
-            at=found.at,
-            vx=self.vx + gain * ((found.x - self.x) / apart_s - self.vx),
-            vy=self.vy + gain * ((found.y - self.y) / apart_s - self.vy),
-            passed_m=math.dist(found.first_seen, self.first_seen),
-        )
-        return replace(seen, walked_at=found.at) if seen.walks else seen
 
     @property
     def fits(self) -> bool:
         """Whether it is or moves like somebody."""
-        return self.size_m <= _LARGEST_M or self.has_moved
+        return self.size_m <= _LARGEST_M or self.way_m > _MOVED_M
 
     @property
     def counts(self) -> bool:
@@ -269,7 +237,7 @@ class Witness:
     def obstacle(self, now: float) -> Obstacle | None:
         """Those who walk, in turn, so that nobody is left out; else the nearest."""
         present = self.present(now)
-        walking = [one for one in present if one.is_somebody]
+        walking = [one for one in present if one.walked]
         if walking:
             return walking[int(now / _TURN_OF_ONE_S) % len(walking)]
         return min(present, key=lambda one: one.gap_m, default=None)
@@ -312,7 +280,7 @@ class Witness:
         """
 
         def away(one: Obstacle) -> float:
-            return math.hypot(one.x - found.x, one.y - found.y)
+            return math.dist(one.place, found.place)
 
         near = min(earlier, key=away, default=None)
         if near is None:
@@ -324,12 +292,13 @@ class Witness:
 
     def _measured(self, body: _Floats, pose: Pose2D, now: float) -> Obstacle:
         """Neighbouring returns as an obstacle that is seen for the first time."""
-        x, y = (float(one) for one in body.mean(0))
+        x, y = body.mean(0).tolist()
         ahead, aside = _seen_from(pose, body)
         size_m = float(np.hypot(*np.ptp(body, axis=0)))
         gap_m = float(self._outline.gap_to(ahead, aside).min())
         beside = float(ahead.mean()), float(aside.mean())
-        return Obstacle(x, y, x, y, size_m, gap_m, now, now, beside)
+        here = x, y
+        return Obstacle(here, here, beside, beside, size_m, gap_m, now, now)
 
 
 def _moved(x: _Floats, y: _Floats, frame: Pose2D) -> tuple[_Floats, _Floats]:

@@ -134,7 +134,7 @@ class Judgement:
         seen = self._witness.obstacle(now)
         if seen is None:
             return None
-        return ReportedObstacle(seen.x, seen.y, seen.size_m, seen.is_somebody)
+        return ReportedObstacle(*seen.place, seen.size_m, seen.walked)
 
     def settle(self, now: float) -> None:
         """Evaluate this moment."""
