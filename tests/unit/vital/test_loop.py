@@ -16,6 +16,7 @@ from iveg.domain.observations import (
 )
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.vital.evaluate import HEARTBEAT_S
+from iveg.vital.health_monitor import GRACE_S
 from iveg.vital.loop import TICK_S
 from tests.builders import detection, detection_frame, odometry, origin
 from tests.unit.vital.desk import Desk, settle
@@ -144,7 +145,7 @@ def test_the_heartbeat_that_came_back_is_evidence_for_the_chain() -> None:
 async def test_a_hop_that_breaks_and_mends_is_told_once_each_time() -> None:
     desk = Desk()
     desk.health_monitor.mqtt_connected = True
-    await desk.wait(0.1)
+    await desk.wait(GRACE_S)
     desk.health_monitor.mqtt_connected = False
     await desk.wait(1.0)
     desk.health_monitor.mqtt_connected = True
