@@ -139,13 +139,11 @@ class SignInPage(Page):
 
     Attributes:
         address: Of this server, as the browser reached it.
-        wrong: A link was tried and does not sign in.
         least: Characters of a password.
         failure: Why the identity provider let nobody in; empty: it was not asked.
     """
 
     address: str
-    wrong: bool = False
     least: int = 0
     failure: str = ""
 
