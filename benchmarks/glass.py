@@ -221,7 +221,7 @@ def iveg_side(
         parts = children_of(demo.pid)
         fiware = [one for one in parts if "fiware" in words_of(one)]
         serve = [one for one in parts if one not in fiware]
-        yield Place(there.sign_in_link, _mqtt_port(there), serve, fiware)
+        yield Place(there.printed_link, _mqtt_port(there), serve, fiware)
 
 
 def words_of(pid: int) -> list[str]:

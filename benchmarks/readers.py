@@ -3,7 +3,7 @@
 Five browsers that draw on one machine measure that machine's drawing; what more pages
 cost a server, and the page that is looked at, is measured with these beside it::
 
-    python -m benchmarks.readers --link http://127.0.0.1:8000/?token=… --pages 4
+    python -m benchmarks.readers --link http://127.0.0.1:8000/signin#token=… --pages 4
 
 A reader asks for ``iveg.2``; a server without it, such as the relay, tells all it has.
 """
@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from http.client import HTTPConnection
 from typing import Final
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs, urlsplit
 
 import orjson
 import uvloop
@@ -93,8 +93,21 @@ def _number(message: bytes) -> int:
 def sign_in(link: str) -> tuple[str, str]:
     """Where the server is, and the cookie that it gives."""
     parts = urlsplit(link)
+    token = parse_qs(parts.fragment).get("token")
+    if token is None:
+        # The relay asks nobody who they are.
+        return parts.netloc, ""
     asking = HTTPConnection(parts.netloc, timeout=10)
-    asking.request("GET", f"{parts.path or '/'}?{parts.query}")
+    asking.request(
+        "POST",
+        "/signin",
+        orjson.dumps({"token": token[0]}),
+        {
+            "Content-Type": "application/json",
+            "Origin": f"http://{parts.netloc}",
+            "X-IVEG": "1",
+        },
+    )
     answer = asking.getresponse()
     cookie = answer.getheader("Set-Cookie") or ""
     asking.close()

@@ -9,7 +9,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from shutil import which
 
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, sync_playwright
+
+from tests.patience import AGAIN
+from tests.processes import Site
 
 FLAGS = [
     "--no-sandbox",
@@ -41,3 +44,13 @@ def running_browser() -> Iterator[Browser]:
         found = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
         yield found
         found.close()
+
+
+def sign_in(context: BrowserContext, place: Site) -> None:
+    """Sign a browser in as the link's page does."""
+    context.request.post(
+        f"{place.url}/signin",
+        data=place.proof,
+        headers=place.own_page,
+        max_retries=AGAIN,
+    )

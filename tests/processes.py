@@ -144,9 +144,14 @@ class Site:
         return f"{self.url}/signin#token={self.settings['IVEG_SIGN_IN_TOKEN']}"
 
     @property
-    def sign_in_link(self) -> str:
-        """The link of earlier versions, which signs in without a script."""
-        return f"{self.url}/?token={self.settings['IVEG_SIGN_IN_TOKEN']}"
+    def proof(self) -> dict[str, str]:
+        """Body of ``POST /signin`` by which the link's page signs in."""
+        return {"token": self.settings["IVEG_SIGN_IN_TOKEN"]}
+
+    @property
+    def own_page(self) -> dict[str, str]:
+        """Headers of a request that a page of this server sends."""
+        return {"X-IVEG": "1", "Origin": self.url}
 
     def start(self, *words: str, module: str = "iveg") -> Program:
         """Start ``python -m iveg WORD …`` here, or another module."""

@@ -58,11 +58,12 @@ class AccessFile:
     Attributes:
         aside: Names of damaged files that nobody has taken away yet.
         failing: Whether the disk refused it at the last time.
+        copied: Whether all that an earlier version had kept elsewhere is in it.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self.failing = False
+        self.failing, self.copied = False, self.exists
         self.aside: list[str] = []
         self._writer = ThreadPoolExecutor(1, "accounts")
         self._newest = Access()
@@ -104,6 +105,7 @@ class AccessFile:
                 _log.warning("%s, line %d: not readable", self._path, number)
                 is_whole = False
         is_whole &= [count for count, _ in found["end"]] == [len(lines) - 1]
+        self.copied = self.exists and all(copied for _, copied in found["end"])
         access = Access(
             tuple(found["account"]), tuple(found["token"]), tuple(found["session"])
         )
@@ -142,7 +144,9 @@ class AccessFile:
             if self._is_foreign():
                 self._put_aside("changed while iVeg ran")
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            self._seen = _seen(write_lines(self._path, FORM, _lines(self._newest)))
+            self._seen = _seen(
+                write_lines(self._path, FORM, _lines(self._newest, self.copied))
+            )
             self.failing = False
         except OSError:
             # Told once, until it works again: every request may come here.
@@ -231,13 +235,13 @@ def earlier_sessions(path: Path) -> tuple[Session, ...]:
     return tuple(load_lines(path, Form("sessions"), read))
 
 
-def _lines(access: Access) -> list[Json]:
+def _lines(access: Access, copied: bool) -> list[Json]:
     rows: list[tuple[str, object]] = [
         *(("account", one) for one in access.accounts),
         *(("token", one) for one in access.tokens),
         *(("session", one) for one in access.sessions),
     ]
-    return [_with_checksum(*row) for row in (*rows, ("end", (len(rows), True)))]
+    return [_with_checksum(*row) for row in (*rows, ("end", (len(rows), copied)))]
 
 
 def _with_checksum(kind: str, row: object) -> Json:

@@ -57,21 +57,14 @@ class Accounts:
     ) -> None:
         self._file, self._url = file, database_url
         self._trail, self._supervision, self._clock = trail, supervision, clock
-        # With a file all whom an earlier version knew are in it.
-        self._is_copied = file.exists
+        is_first = not file.exists
         self.book = AccessBook(file.load())
-        self.book.on_change.append(self._note)
-        if self._is_copied:
-            self._remember()
-        else:
+        if is_first:
             before = earlier_sessions(file.beside("sessions.jsonl"))
             self.book.add(Access(sessions=before))
+        self.book.on_change.append(self._note)
+        self.book.on_keep.append(lambda: file.save(self.book.picture()))
         self.people = People(self.book, Passwords(), clock)
-
-    def _remember(self) -> None:
-        """Have the file written from now on."""
-        self.book.on_keep.append(lambda: self._file.save(self.book.picture()))
-        self.book.keep()
 
     @property
     def state(self) -> str:
@@ -111,7 +104,7 @@ class Accounts:
         Raises:
             HopError: nobody knows yet who was in an earlier version's database.
         """
-        if not self._is_copied:
+        if not self._file.copied:
             raise HopError("database", "accounts of earlier versions are not read yet")
         if self.people.is_led():
             return None
@@ -125,7 +118,8 @@ class Accounts:
 
     async def run(self) -> None:
         """Look after the file until cancelled."""
-        while not self._is_copied:
+        self.book.keep()
+        while not self._file.copied:
             with suppress(HopError):
                 await self.copy_earlier()
                 break
@@ -149,12 +143,11 @@ class Accounts:
 
     async def copy_earlier(self) -> None:
         """Copy who was known to an earlier version, once. Raises HopError."""
-        if self._is_copied:
+        if self._file.copied:
             return
         found = await asyncio.to_thread(earlier_access, self._url)
-        self._is_copied = True
+        self._file.copied = True
         self.book.add(found or NOBODY)
-        self._remember()
         await self._file.look()
         if found is not None and not self._file.failing:
             await asyncio.to_thread(mark_moved, self._url, self._clock().wall)

@@ -35,7 +35,7 @@ from iveg.web.live.pictures import Past
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.drawing import Pages
 from iveg.web.security import audited, headers, rate_limits
-from iveg.web.security.authentication import Authenticator, SignInLink
+from iveg.web.security.authentication import Authenticator
 from iveg.web.security.requirements import DocumentedApp
 from iveg.web.security.roles import Principal
 from iveg.web.views import Views
@@ -143,9 +143,6 @@ def build_app(
     )
     app.add_middleware(headers.BodyLimit)
     app.add_middleware(rate_limits.SocketLimits, identify=identify, clock=clock)
-    app.add_middleware(
-        SignInLink, authenticator=web.authenticator, refusal=pages.refused_link
-    )
     app.add_middleware(rate_limits.SignInGate, clock=clock)
     # Last is outermost: a refusal carries the headers, too.
     app.add_middleware(headers.SecurityHeaders)

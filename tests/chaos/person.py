@@ -80,7 +80,7 @@ class Person:
         try:
             answer = asking()
             if answer.status_code == 401:
-                self._browser.get(self._place.sign_in_link)
+                self._browser.post("/signin", json=self._place.proof)
                 answer = asking()
         except httpx.HTTPError:
             return None

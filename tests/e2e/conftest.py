@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, ViewportSize
 
-from tests.browsers import running_browser
+from tests.browsers import running_browser, sign_in
 from tests.e2e.slowly import draw_slowly
-from tests.patience import AGAIN, PATIENCE_MS
+from tests.patience import PATIENCE_MS
 from tests.processes import EMULATOR, Site, site
 
 _BUSY = "503 (Service Unavailable)"
@@ -112,7 +112,7 @@ def opened(
         if complaints is not None:
             _listen(page, complaints)
         # As the link does, without the page that it ends on.
-        context.request.get(stack.sign_in_link, max_redirects=0, max_retries=AGAIN)
+        sign_in(context, stack)
         page.goto(stack.url + route)
         yield page
 

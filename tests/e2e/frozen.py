@@ -20,6 +20,7 @@ from iveg.domain.records import Record
 from iveg.lab.emulator.fleet import climate_at
 from iveg.ngsi.codec import format_stamp
 from iveg.vital.record import Waiting
+from tests.browsers import sign_in
 from tests.fakes.records import (
     alert_record,
     climate_record,
@@ -120,7 +121,8 @@ def frozen_page(
     context.set_default_timeout(PATIENCE_MS)
     context.add_init_script("localStorage.setItem('iveg.hints', '3')")
     page = context.new_page()
-    page.goto(f"{past.sign_in_link}", wait_until="commit")
+    sign_in(context, past)
+    page.goto(f"{past.url}/", wait_until="commit")
     looks = {"iveg_theme": theme, "iveg_language": language}
     context.add_cookies(
         [{"name": name, "value": look, "url": past.url} for name, look in looks.items()]

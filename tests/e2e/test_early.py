@@ -16,9 +16,9 @@ from playwright.sync_api import (
     expect,
 )
 
+from tests.browsers import sign_in
 from tests.e2e.frozen import past_site
 from tests.e2e.reading import strip_stop
-from tests.patience import AGAIN
 from tests.processes import Site, until
 
 pytestmark = pytest.mark.e2e
@@ -50,7 +50,7 @@ def context(browser: Browser, past: Site) -> Iterator[BrowserContext]:
     """A signed-in browser on a phone."""
     size = {"width": 390, "height": 844}
     with browser.new_context(viewport=size, locale="es-ES") as found:  # type: ignore[arg-type]
-        found.request.get(past.sign_in_link, max_redirects=0, max_retries=AGAIN)
+        sign_in(found, past)
         yield found
 
 

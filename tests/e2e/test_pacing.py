@@ -15,6 +15,7 @@ from playwright.sync_api import Browser, Page
 
 from iveg.web.live.feed import FRAMES
 from tests.bonds import bound
+from tests.browsers import sign_in
 from tests.chaos.radio import Radio, Weather
 from tests.e2e.reading import evaluate
 from tests.fleet import names
@@ -99,9 +100,9 @@ def test_nothing_older_than_its_successor_is_painted_and_the_window_holds(
     seen = []
     with Radio(int(crowd.settings["IVEG_PORT"])) as line:
         line.weather = FAR
-        far = _through(crowd, line)
-        for link, scripts in (far, [WATCH]), (crowd.sign_in_link, [WATCH, BUSY]):
-            with _opened(browser, link, *scripts) as page:
+        far = f"http://127.0.0.1:{line.port}"
+        for url, scripts in (far, [WATCH]), (crowd.url, [WATCH, BUSY]):
+            with _opened(browser, crowd, url, *scripts) as page:
                 page.wait_for_timeout(1000 * SECONDS)
                 page.wait_for_function(
                     ALL_PAINTED, arg=[len(ROBOTS), FRAMES], timeout=PATIENCE_MS
@@ -115,15 +116,11 @@ def test_nothing_older_than_its_successor_is_painted_and_the_window_holds(
 
 
 @contextmanager
-def _opened(browser: Browser, link: str, *scripts: str) -> Iterator[Page]:
+def _opened(browser: Browser, place: Site, url: str, *scripts: str) -> Iterator[Page]:
     with browser.new_context() as context:
         context.add_init_script(";".join(f"({script})()" for script in scripts))
         page = context.new_page()
+        sign_in(context, place)
         # A long line.
-        page.goto(link, timeout=90_000)
+        page.goto(url, timeout=90_000)
         yield page
-
-
-def _through(place: Site, line: Radio) -> str:
-    """The sign-in link at the other end of a line."""
-    return place.sign_in_link.replace(place.url, f"http://127.0.0.1:{line.port}")

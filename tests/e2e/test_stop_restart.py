@@ -81,7 +81,7 @@ def test_f42_a_page_whose_session_is_over_stops_and_asks_to_sign_in_for_the_rest
     why = card(page, "AGV").locator('[data-part="release-why"]')
     expect(why).to_have_text("La sesión ha terminado: entre de nuevo para rearmar.")
     expect(page.locator('[data-release="AGV"]')).to_be_disabled()
-    page.goto(stack.sign_in_link)
+    page.goto(stack.printed_link)
     expect(strip_stop(page, "AGV")).to_contain_text("PARADO")
 
 

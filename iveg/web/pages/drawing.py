@@ -168,26 +168,13 @@ class Pages:
         response.headers.update(problem.headers)
         return response
 
-    def refused_link(self, request: Request, problem: Problem) -> Response:
-        """The page for a sign-in link that is wrong, or tried too often."""
-        if problem.status != 401:
-            return self.problem(request, problem)
-        return self.sign_in(request, 401, wrong=True)
-
     def sign_in(
-        self,
-        request: Request,
-        status: int = 200,
-        *,
-        wrong: bool = False,
-        failure: str = "",
+        self, request: Request, status: int = 200, *, failure: str = ""
     ) -> Response:
         """The sign-in page; ``failure`` is the identity provider's."""
         address = str(request.base_url).rstrip("/")
         frame = self.frame(request, "signin")
-        return self.draw(
-            frame, status, address=address, wrong=wrong, least=LEAST, failure=failure
-        )
+        return self.draw(frame, status, address=address, least=LEAST, failure=failure)
 
 
 def appearance_of(request: Request) -> Appearance:

@@ -13,12 +13,11 @@ STOP outlives the session (SECURITY.md): a person who was signed in once can sti
 import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import urlsplit
 
-from starlette.exceptions import HTTPException, WebSocketException
+from starlette.exceptions import WebSocketException
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import RedirectResponse, Response
-from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from iveg.domain.accounts import DEFAULT_NAME, LINK_PERSON, Account
@@ -29,8 +28,6 @@ from iveg.web.problems import (
     ForeignOriginError,
     NotJsonError,
     NotSignedInError,
-    Problem,
-    problem_of,
 )
 from iveg.web.security.attempts import Attempts
 from iveg.web.security.audited import READING
@@ -88,23 +85,13 @@ class Authenticator:
             NotJsonError: a body that is not JSON.
         """
         refuse_forgery(request)
-        return self._exchange(request, token, Response(status_code=204))
-
-    def follow_link(self, request: Request, token: str) -> Response:
-        """Exchange the token in the query of an old link. Raises HTTPException."""
-        response = RedirectResponse("/", 303)
-        response.headers["Cache-Control"] = "no-store"
-        response.headers["Referrer-Policy"] = "no-referrer"
-        return self._exchange(request, token, response)
-
-    def _exchange(self, request: Request, token: str, response: Response) -> Response:
         # Somebody else's wrong links must not shut out whoever has the right one.
         if not same_secret(token, self._credentials.link):
             self.attempts.refuse(request, "wrong token")
         self._end_before(request)
         name = self._credentials.link_name
         cookie = self.sessions.open(name, "operator", LINK_PERSON)
-        return self.admit(request, cookie, response)
+        return self.admit(request, cookie, Response(status_code=204))
 
     async def prove(
         self,
@@ -281,50 +268,3 @@ def _is_own(origin: str | None, connection: HTTPConnection) -> bool:
     except ValueError:
         return False  # such as brackets that do not close
     return bool(host) and place.lower() == host.lower()
-
-
-# --- the link of earlier versions -------------------------------------------------
-
-
-class SignInLink:
-    """Takes the token off ``GET /?token=…`` before anything can log or keep it.
-
-    For one version more: links now carry it behind ``#``, where no server and no proxy
-    sees it; the page posts it (``POST /signin``).
-
-    Args:
-        authenticator: Where the token is looked at.
-        refusal: Draws the page for a wrong token.
-    """
-
-    def __init__(
-        self,
-        app: ASGIApp,
-        authenticator: Authenticator,
-        refusal: Callable[[Request, Problem], Response],
-    ) -> None:
-        self._app = app
-        self._authenticator = authenticator
-        self._refusal = refusal
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request."""
-        token = _token_in_link(scope)
-        if token is None:
-            await self._app(scope, receive, send)
-            return
-        # Servers write the query into their access log after the answer.
-        scope["query_string"] = b""
-        request = Request(scope)
-        try:
-            response = self._authenticator.follow_link(request, token)
-        except HTTPException as error:
-            response = self._refusal(request, problem_of(error))
-        await response(scope, receive, send)
-
-
-def _token_in_link(scope: Scope) -> str | None:
-    if scope["type"] != "http" or scope["path"] != "/" or scope["method"] != "GET":
-        return None
-    query: bytes = scope["query_string"]
-    return parse_qs(query.decode("latin-1")).get("token", [None])[0]

@@ -20,10 +20,10 @@ const FAILED = "#signin-failed";
 /**
  * The token or invitation of a link; null without one.
  *
- * @param {string} hash of its address, with the `#`
+ * @param {string} part of its address, with the `#` or `?`
  */
-export function tokenIn(hash, name = "token") {
-  return new URLSearchParams(hash.slice(1)).get(name);
+export function tokenIn(part, name = "token") {
+  return new URLSearchParams(part.slice(1)).get(name);
 }
 
 /**
@@ -54,7 +54,8 @@ function show(notice) {
 }
 
 function followLink() {
-  const token = tokenIn(location.hash);
+  // Links of earlier versions carry it in the query.
+  const token = tokenIn(location.hash) ?? tokenIn(location.search);
   const invitation = tokenIn(location.hash, "invitation");
   if (token === null && invitation === null) return;
   history.replaceState(null, "", location.pathname);
