@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Annotated, Literal, get_args
+from typing import IO, Annotated, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
@@ -281,10 +281,11 @@ def _played(channel: Channel, payload: bytes) -> Iterator[Played]:
             observations = codec.read_notification(payload)[1].observations
         else:
             return
-        for one in observations:
-            read = one.read() if isinstance(one, UnreadScan) else one
-            if isinstance(read, get_args(Played)):
-                yield read
+        for observation in observations:
+            if isinstance(observation, UnreadScan):
+                yield observation.read()
+            elif isinstance(observation, Played):
+                yield observation
     except UnreadableError:
         return
 

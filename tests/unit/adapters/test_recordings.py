@@ -13,7 +13,7 @@ import pytest
 from mcap.reader import make_reader
 
 from iveg.adapters.recordings import recorder as module
-from iveg.adapters.recordings.mcap_file import finish_broken, is_own, read_messages
+from iveg.adapters.recordings.mcap_file import finish_broken, read_messages
 from iveg.adapters.recordings.pictures import WHOLE
 from iveg.adapters.recordings.recorder import (
     MOST_BYTES,
@@ -222,15 +222,6 @@ async def test_every_cut_of_a_file_is_read_as_far_as_it_goes(site: Site) -> None
         counts.append(len(payloads(cut)))
     assert counts == sorted(counts)
     assert counts[-1] >= 40
-
-
-def test_a_foreign_file_is_told_from_ours(tmp_path: Path) -> None:
-    for content in (b"", b"no MCAP at all", bytes(100)):
-        path = tmp_path / "other.mcap"
-        path.write_bytes(content)
-        assert not is_own(path)
-        with pytest.raises(DataFileError):
-            list(read_messages(path))
 
 
 # --- where there is no room -------------------------------------------------------
