@@ -138,6 +138,8 @@ async def test_viewers_draw_poses_scans_and_boxes_thinned(site: Site) -> None:
     def came(seconds: float, observation: Observation) -> None:
         site.recorder.draw(Received(observation, at(seconds)))
 
+    asked = Received(odometry(x=99.0), at(0.0), asked=True)
+    site.recorder.draw(asked)
     for n in range(30):
         came(n / 30, Overtaken("AGI", origin(n), LaserScan))
         came(n / 30, odometry(x=n, origin=origin(n)))
