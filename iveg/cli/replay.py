@@ -29,8 +29,8 @@ async def live_robot(settings: Settings, robots: Iterable[str]) -> str | None:
     orion, agent = open_fiware(settings)
     async with orion, agent:
         for robot_id in robots:
-            heard = await orion.modified_at(robot_id)
-            if heard is not None and clock.wall() - heard < _LIVE_S:
+            modified = await orion.modified_at(robot_id)
+            if modified is not None and clock.wall() - modified < _LIVE_S:
                 return robot_id
     return None
 

@@ -46,7 +46,7 @@ def superfluous(
     """Files that are over the limits; never the one that is written."""
     days, size = set[str](), 0
     gone = []
-    for file in sorted(files, key=lambda one: one.name, reverse=True):
+    for file in sorted(files, key=lambda file: file.name, reverse=True):
         days.add(file.day)
         size += file.size
         is_outdated = 0 < limits.days < len(days)

@@ -95,6 +95,9 @@ class InputRecorder:
 
     def draw(self, received: Received) -> None:
         """Record what viewers draw of an observation."""
+        if received.asked:
+            # Nobody knows how old an answer of Orion's is.
+            return
         for channel, payload in self._drawing.messages(received):
             self._queue(Message(channel, received.at, payload))
 

@@ -93,8 +93,8 @@ class BagPlan:
     def table(self) -> list[str]:
         """One line a topic: name, type, messages, and what becomes of it."""
         rows = [
-            (one.name, one.type, str(one.count), self._fates.get(one, _NOT_NEEDED))
-            for one in self._topics
+            (each.name, each.type, str(each.count), self._fates.get(each, _NOT_NEEDED))
+            for each in self._topics
         ]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
@@ -181,7 +181,7 @@ class BagPass:
         found = self._works[use.role](message, now)
         if found is None and use.role in _CHOSEN:
             faults = self._lost.faults(now)
-            why = "; ".join(f"{one.code}, {one.about}" for one in faults)
+            why = "; ".join(f"{fault.code}, {fault.about}" for fault in faults)
             raise UnreadableError("unplaced", why)
         return found
 
@@ -204,7 +204,7 @@ class BagPass:
     def _detections(self, message: Message, now: float) -> DetectionFrame:
         if isinstance(message, d.DetectionArray):
             seen = message.detections
-            if seen and not any(one.bbox3d.frame_id for one in seen):
+            if seen and not any(box.bbox3d.frame_id for box in seen):
                 raise UnreadableError("no_depth", "boxes in a picture")
         return self._boxes.locate(message, now)
 
@@ -257,8 +257,8 @@ def _link(odometry: ros.Odometry) -> ros.TFMessage:
     place, turned = odometry.pose.pose.position, odometry.pose.pose.orientation
     transform = ros.Transform(ros.Vector3(place.x, place.y, place.z), turned)
     child = odometry.child_frame_id or Frames().base_link
-    one = ros.TransformStamped(odometry.header, child, transform)
-    return ros.TFMessage((one,))
+    link = ros.TransformStamped(odometry.header, child, transform)
+    return ros.TFMessage((link,))
 
 
 # --- bags -------------------------------------------------------------------------
@@ -327,7 +327,9 @@ class Bag:
         }
         with _open(self._path) as reader:
             connections = [
-                one for one in reader.connections if (one.topic, one.msgtype) in uses
+                found
+                for found in reader.connections
+                if (found.topic, found.msgtype) in uses
             ]
             records = reader.messages(connections=connections) if connections else ()
             for source, logged, data in records:
@@ -356,10 +358,10 @@ def _topics_of(path: Path) -> list[BagTopic]:
     """Topics of a bag by name; several recorded connections of one are joined."""
     counts: dict[tuple[str, str, str], int] = {}
     with _open(path) as reader:
-        for one in reader.connections:
-            digest = one.digest if one.digest.startswith("RIHS01_") else ""
-            key = one.topic, one.msgtype, digest
-            counts[key] = counts.get(key, 0) + one.msgcount
+        for found in reader.connections:
+            digest = found.digest if found.digest.startswith("RIHS01_") else ""
+            key = found.topic, found.msgtype, digest
+            counts[key] = counts.get(key, 0) + found.msgcount
     return [
         BagTopic(name, kind, counts[name, kind, digest], digest)
         for name, kind, digest in sorted(counts)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Annotated, Literal, get_args
+from typing import IO, Annotated, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
@@ -280,9 +280,9 @@ def _played(channel: Channel, payload: bytes) -> Iterator[Played]:
             observations = codec.read_notification(payload)[1].observations
         else:
             return
-        for one in observations:
-            if isinstance(one, get_args(Played)):
-                yield one
+        for observation in observations:
+            if isinstance(observation, Played):
+                yield observation
     except UnreadableError:
         return
 

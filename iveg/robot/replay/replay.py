@@ -159,7 +159,7 @@ def open_recording(
     if tell is not None:
         for line in table:
             tell(line)
-    if not any(isinstance(one.observation, Odometry) for one in recording()):
+    if not any(isinstance(entry.observation, Odometry) for entry in recording()):
         raise DataFileError(str(path), "", "holds no odometry that can be used.")
     return recording
 

@@ -92,12 +92,12 @@ def router(sources: Sources) -> APIRouter:
         responses={200: {"content": {MEDIA_TYPE: {}}}, **refusals(404, 503)},
     )
     async def incident(
-        asked: Annotated[About, Query()],
+        subject: Annotated[About, Query()],
         principal: Operator,
         request: Request,
     ) -> FileResponse:
         """Everything about some minutes as a ZIP, at most an hour."""
-        since, until, said = await _range(asked, sources)
+        since, until, said = await _range(subject, sources)
         now = sources.clock().wall
         if since > now:
             raise HTTPException(422, "That range is still to come.")
@@ -121,28 +121,28 @@ def router(sources: Sources) -> APIRouter:
     return routes
 
 
-async def _range(asked: About, sources: Sources) -> tuple[float, float, str]:
+async def _range(subject: About, sources: Sources) -> tuple[float, float, str]:
     """Since, until (Unix s), and what it is about."""
     rows: dict[str, tuple[ListOf[Any], str]] = {
         "decision": (lists.DECISIONS, "ended_at"),
         "command": (lists.COMMANDS, "standing_at"),
         "alert": (lists.ALERTS, "cleared_at"),
     }
-    for kind, (of, ends) in rows.items():
-        wanted = getattr(asked, kind)
+    for kind, (table, ends) in rows.items():
+        wanted = getattr(subject, kind)
         if wanted is None:
             continue
-        found = await sources.queries.one(of, wanted)
+        found = await sources.queries.one(table, wanted)
         if found is None:
             raise HTTPException(404, f"There is no such {kind}.")
-        began = getattr(found, of.at.name)
+        began = getattr(found, table.at.name)
         since, ended = began - BEFORE_S, getattr(found, ends) or began
         return since, min(ended + AFTER_S, since + LONGEST_S), f"{kind} {wanted}"
-    if asked.since is None or asked.until is None:
+    if subject.since is None or subject.until is None:
         raise HTTPException(
             422, "Name a decision, a command, an alert, or since and until."
         )
-    since, until = asked.since.timestamp(), asked.until.timestamp()
+    since, until = subject.since.timestamp(), subject.until.timestamp()
     if until - since > LONGEST_S:
         raise HTTPException(422, "A pack holds an hour at most.")
     return since, until, "range"
@@ -159,7 +159,7 @@ async def _pack(sources: Sources, folder: Path, about: _About) -> None:
         "since": format_stamp(since),
         "until": format_stamp(until),
         "messages": messages,
-        "rules": [Rule.of(one).model_dump(mode="json") for one in sources.rules()],
+        "rules": [Rule.of(rule).model_dump(mode="json") for rule in sources.rules()],
         "settings": dict(sources.settings),
     }
     rows = await _rows(sources.queries, since, until)
@@ -178,11 +178,11 @@ async def _rows(
         "detections": lists.DETECTIONS,
         "odometry": lists.ODOMETRY,
     }
-    asked = Filter(since=since, until=until, limit=MOST_ROWS)
-    found = {name: await _all(queries, of, asked) for name, of in parts.items()}
+    span = Filter(since=since, until=until, limit=MOST_ROWS)
+    found = {name: await _all(queries, rows, span) for name, rows in parts.items()}
     # A note is about a moment, whenever it was written after it.
     later = await _all(queries, lists.NOTES, Filter(since=since, limit=MOST_ROWS))
-    found["notes"] = [one for one in later if since <= _moment_of(one) < until]
+    found["notes"] = [note for note in later if since <= _moment_of(note) < until]
     return found
 
 
@@ -195,10 +195,10 @@ def _moment_of(line: LogRecord) -> float:
     return float(line.slots.get("pinned_at", line.at))
 
 
-async def _all(queries: Queries, of: ListOf[R], asked: Filter) -> list[R]:
+async def _all(queries: Queries, rows: ListOf[R], span: Filter) -> list[R]:
     """A whole list, oldest first."""
-    pages = queries.pages(of, await queries.page(of, asked), asked)
-    return [one async for page in pages for one in page][::-1]
+    pages = queries.pages(rows, await queries.page(rows, span), span)
+    return [row async for page in pages for row in page][::-1]
 
 
 def _write(
@@ -219,8 +219,8 @@ def _write(
                 "report.html", write_report(language, since, until, events, said)
             )
             pack.writestr("about.json", orjson.dumps(facts, option=orjson.OPT_INDENT_2))
-            for name, of in rows.items():
-                lines = (orjson.dumps(asdict(one)) + b"\n" for one in of)
+            for name, found in rows.items():
+                lines = (orjson.dumps(asdict(row)) + b"\n" for row in found)
                 pack.writestr(f"rows/{name}.ndjson", b"".join(lines))
             pack.write(folder / "recording.mcap", "recording.mcap")
     except OSError as error:
@@ -251,7 +251,7 @@ def write_report(
     is about, as its manifest has it.
     """
     sentences = read_sentences(language)
-    lines = sorted(_lines(rows, sentences), key=lambda one: one.at)
+    lines = sorted(_lines(rows, sentences), key=lambda line: line.at)
     html = _template().render(
         language=language,
         say=lambda key, **slots: sentences.say(key, slots),

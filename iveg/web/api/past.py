@@ -31,7 +31,7 @@ def router(recordings: InputRecorder, past: Past, clock: Clock) -> APIRouter:
     async def listing() -> Response:
         """Recordings of what came in, oldest first."""
         files = await recordings.files()
-        return Json(Listing(items=[Recording.of(one) for one in files]))
+        return Json(Listing(items=[Recording.of(file) for file in files]))
 
     @routes.get(
         "/recordings/{recording_id}",

@@ -108,7 +108,7 @@ class PictureRecorder:
             robots = map(topics.ROBOT.of, self._views.robot_ids)
             return list(dict.fromkeys((*robots, *_AT_ONCE, *versions)))
         seen = self._versions
-        return [one for one, version in versions.items() if seen.get(one) != version]
+        return [name for name, version in versions.items() if seen.get(name) != version]
 
     def _events(self) -> list[bytes]:
         """New lines of the log, and orders where they have changed."""
@@ -138,10 +138,10 @@ class PictureRecorder:
         return [] if data is None else [self._written(topic, data)]
 
     def _people(self, now: Instant) -> dict[str, Any]:
-        people = [one.model_dump(mode="json") for one in self._views.people(now)]
+        people = [person.model_dump(mode="json") for person in self._views.people(now)]
         return {
-            "ids": [one["person_id"] for one in people],
-            "changed": [{**one, "at": now.mono} for one in people],
+            "ids": [person["person_id"] for person in people],
+            "changed": [{**person, "at": now.mono} for person in people],
         }
 
     def _scan(self, topic: str) -> Iterable[bytes]:
@@ -220,8 +220,13 @@ class World:
             self._robots[key] = at, {**known, **data}
         elif member == topics.PEOPLE.member:
             people = self._people
-            people |= {one["person_id"]: (one["at"], one) for one in data["changed"]}
-            self._people = {one: people[one] for one in data["ids"] if one in people}
+            people |= {
+                person["person_id"]: (person["at"], person)
+                for person in data["changed"]
+            }
+            self._people = {
+                name: people[name] for name in data["ids"] if name in people
+            }
         elif member == topics.DETECTIONS.member:
             self._detections[key] = at, data
         elif member == topics.LOG.member:
@@ -235,11 +240,11 @@ class World:
         return {
             **lists,
             topics.CLIMATE.member: None,
-            **{name: self._aged(one) for name, one in self._values.items()},
+            **{name: self._aged(value) for name, value in self._values.items()},
             "robots": [self._robot(robot_id) for robot_id in self._robots],
-            "people": [self._person(one) for one in self._people.values()],
+            "people": [self._person(value) for value in self._people.values()],
             "detections": {
-                key: self._aged(one) for key, one in self._detections.items()
+                key: self._aged(value) for key, value in self._detections.items()
             },
             "log": self._log,
             "scans": [_drawn(scan) for scan in self._scans.values()],
@@ -273,7 +278,7 @@ class World:
 def _older(value: Any, by: float) -> Any:
     """A value when all of its ages are greater by so much (s)."""
     if isinstance(value, list):
-        return [_older(one, by) for one in value]
+        return [_older(item, by) for item in value]
     if not isinstance(value, dict):
         return value
     return {

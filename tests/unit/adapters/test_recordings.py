@@ -13,7 +13,7 @@ import pytest
 from mcap.reader import make_reader
 
 from iveg.adapters.recordings import recorder as module
-from iveg.adapters.recordings.mcap_file import finish_broken, is_own, read_messages
+from iveg.adapters.recordings.mcap_file import finish_broken, read_messages
 from iveg.adapters.recordings.pictures import WHOLE
 from iveg.adapters.recordings.recorder import (
     MOST_BYTES,
@@ -135,6 +135,8 @@ async def test_viewers_draw_poses_scans_and_boxes_thinned(site: Site) -> None:
     def came(seconds: float, observation: Observation) -> None:
         site.recorder.draw(Received(observation, at(seconds)))
 
+    asked = Received(odometry(x=99.0), at(0.0), asked=True)
+    site.recorder.draw(asked)
     for n in range(30):
         came(n / 30, odometry(x=n, origin=origin(n)))
         came(n / 30, odometry(x=n, origin=origin(n)))
@@ -218,15 +220,6 @@ async def test_every_cut_of_a_file_is_read_as_far_as_it_goes(site: Site) -> None
         counts.append(len(payloads(cut)))
     assert counts == sorted(counts)
     assert counts[-1] >= 40
-
-
-def test_a_foreign_file_is_told_from_ours(tmp_path: Path) -> None:
-    for content in (b"", b"no MCAP at all", bytes(100)):
-        path = tmp_path / "other.mcap"
-        path.write_bytes(content)
-        assert not is_own(path)
-        with pytest.raises(DataFileError):
-            list(read_messages(path))
 
 
 # --- where there is no room -------------------------------------------------------
