@@ -5,15 +5,14 @@ their own, and the migrations have tests of their own.
 """
 
 from dataclasses import asdict
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from sqlalchemy import insert
+from sqlalchemy import Connection, MetaData, Table, insert
 
 from iveg.adapters.history.engine import sqlite_file, upgrade
 from iveg.adapters.history.recorder import Store
-from iveg.adapters.history.tables import accounts, api_tokens
 from iveg.domain.accounts import Account, ApiToken, name_key
 
 
@@ -34,10 +33,14 @@ def _newest() -> bytes:
 
 def put_into_tables(url: str, person: Account, program: ApiToken) -> None:
     """Whom the version before has kept in the database."""
-    named = {"name_key": name_key(person.name), "language": "es"}
-    people = insert(accounts).values(**asdict(person) | named)
-    named = {"name_key": name_key(program.name)}
-    programs = insert(api_tokens).values(**asdict(program) | named)
     store = Store(url)
-    store.run(lambda one: (one.execute(people), one.execute(programs)))
+    spoken = {"language": "es"}
+    for name, row, more in (("accounts", person, spoken), ("api_tokens", program, {})):
+        values = asdict(row) | {"name_key": name_key(row.name)} | more
+        store.run(partial(_insert, name=name, values=values))
     store.close()
+
+
+def _insert(connection: Connection, name: str, values: dict[str, object]) -> None:
+    table = Table(name, MetaData(), autoload_with=connection)
+    connection.execute(insert(table).values(**values))

@@ -8,7 +8,6 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import hypot
-from statistics import fmean
 
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
@@ -62,30 +61,16 @@ class EncounterCounts:
 
     Attributes:
         slowed: Those of which the robot itself said that it was slow.
-        foretold: Those that were known before the robot was inside.
-        foretold_s: How long before, on average (s); None without any.
     """
 
     count: int = 0
     slowed: int = 0
-    foretold: int = 0
-    foretold_s: float | None = None
 
 
 def encounter_counts(decisions: Iterable[DecisionRecord]) -> EncounterCounts:
     """The encounters with people among these decisions."""
     met = [one for one in decisions if one.kind == "mandate" and one.reason == "person"]
-    foretold = [
-        float(ahead_s)
-        for one in met
-        if (ahead_s := one.rule_parameters.get("foretold_s")) is not None
-    ]
-    return EncounterCounts(
-        len(met),
-        sum(one.applied_at is not None for one in met),
-        len(foretold),
-        fmean(foretold) if foretold else None,
-    )
+    return EncounterCounts(len(met), sum(one.applied_at is not None for one in met))
 
 
 def worked_minutes(

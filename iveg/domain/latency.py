@@ -262,9 +262,6 @@ class Stream:
         return took
 
 
-_MOST_ROBOTS: Final = 256
-
-
 class LatencyWatch:
     """Latency of the whole fleet: the calls that boundaries make for each message.
 
@@ -280,11 +277,13 @@ class LatencyWatch:
         self, robots: Iterable[str], composed_at: Callable[..., float | None]
     ) -> None:
         self._composed_at = composed_at
-        self._streams: dict[tuple[str, Data], Stream] = {}
-        self.clocks: dict[str, ClockOffset] = {}
+        self.clocks = {robot_id: ClockOffset() for robot_id in robots}
+        self._streams = {
+            (robot_id, data): Stream(robot_id, data, clock)
+            for robot_id, clock in self.clocks.items()
+            for data in DATA
+        }
         self._slice_at: float | None = None
-        for robot_id in robots:
-            self._add(robot_id)
 
     @property
     def streams(self) -> list[Stream]:
@@ -338,15 +337,7 @@ class LatencyWatch:
         data = data_of(kind_of(received.observation))
         if data is None or received.asked:
             return None
-        robot_id: str = received.observation.robot_id
-        if robot_id not in self.clocks and len(self.clocks) < _MOST_ROBOTS:
-            self._add(robot_id)
-        return self._streams.get((robot_id, data))
-
-    def _add(self, robot_id: str) -> None:
-        clock = self.clocks[robot_id] = ClockOffset()
-        for data in DATA:
-            self._streams[robot_id, data] = Stream(robot_id, data, clock)
+        return self._streams.get((received.observation.robot_id, data))
 
 
 # --- the table ------------------------------------------------------------------------

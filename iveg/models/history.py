@@ -303,8 +303,6 @@ class Encounters(Model):
 
     count: int
     slowed: int = Field(description="Of which the robot said that it was slow.")
-    foretold: int = Field(description="Known before the robot was inside.")
-    foretold_s: Tenth | None = Field(description="How long before, on average.")
 
 
 class Pass(Model):

@@ -12,7 +12,16 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from sqlalchemy import Connection, Engine, RowMapping, Select, Table, insert, select
+from sqlalchemy import (
+    Connection,
+    Engine,
+    MetaData,
+    RowMapping,
+    Select,
+    Table,
+    select,
+    text,
+)
 from sqlalchemy.exc import SQLAlchemyError
 
 from iveg.adapters.history import lists
@@ -20,11 +29,9 @@ from iveg.adapters.history.engine import reading_engine, reason_of
 from iveg.adapters.history.lists import Filter, ListOf, Page, R, record_of
 from iveg.adapters.history.recorder import Store
 from iveg.adapters.history.tables import (
+    EARLIER,
     OPEN,
-    access_moved,
-    accounts,
     alerts,
-    api_tokens,
     command_events,
 )
 from iveg.domain.accounts import Access, Account, ApiToken
@@ -183,20 +190,23 @@ def earlier_access(url: str) -> Access | None:
 
 def mark_moved(url: str, now: float) -> None:
     """Note that all is copied (Unix s). Raises HopError."""
+    mark = text("INSERT INTO access_moved (at) VALUES (:at)")
     store = Store(url)
     try:
-        store.run(lambda one: one.execute(insert(access_moved).values(at=now)))
+        store.run(lambda one: one.execute(mark, {"at": now}))
     finally:
         store.close()
 
 
 def _read(connection: Connection) -> Access | None:
-    if connection.execute(select(access_moved)).first() is not None:
+    people, programs, moved = (
+        Table(name, MetaData(), autoload_with=connection) for name in EARLIER
+    )
+    if connection.execute(select(moved)).first() is not None:
         return None
-    people, programs = _rows(connection, accounts), _rows(connection, api_tokens)
     return Access(
-        tuple(Account(**row) for row in people),
-        tuple(ApiToken(**row) for row in programs),
+        tuple(Account(**row) for row in _rows(connection, people)),
+        tuple(ApiToken(**row) for row in _rows(connection, programs)),
     )
 
 

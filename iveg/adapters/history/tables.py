@@ -282,47 +282,10 @@ PLACED = {
 }
 
 
-def _earlier(
-    name: str,
-    key: str,
-    texts: Sequence[str],
-    numbers: Sequence[str],
-    *beside: Column[Any],
-) -> Table:
-    """A table of earlier versions, from which rows are copied once."""
-    return Table(
-        name,
-        metadata,
-        Column(key, Text, primary_key=True),
-        *(Column(one, Text, nullable=False) for one in texts),
-        *(Column(one, Double, nullable=False) for one in numbers),
-        *beside,
-        Column("ends_at", Double),
-        UniqueConstraint("name_key"),
-    )
-
-
-accounts = _earlier(
-    "accounts",
-    "account_id",
-    ["name", "name_key", "role", "password", "invitation", "provider", "language"],
-    ["invited_until", "since"],
-    Column("disabled", Boolean, nullable=False),
-)
-api_tokens = _earlier(
-    "api_tokens",
-    "token_id",
-    ["name", "name_key", "scope", "digest"],
-    ["made_at"],
-    Column("used_at", Double),
-)
-access_moved = Table("access_moved", metadata, Column("at", Double, nullable=False))
-"""One row once accounts and tokens are in their own file; both tables go later."""
+EARLIER = "accounts", "api_tokens", "access_moved"
+"""Tables of earlier versions, whose rows are copied once; they go later."""
 AGES: dict[str, Column[Any]] = {
-    "accounts": accounts.c.since,
-    "api_tokens": api_tokens.c.made_at,
-    "access_moved": access_moved.c.at,
-    **{one.table.name: one.at for one in TABLE_MAPPINGS.values()},
+    one.table.name: one.at for one in TABLE_MAPPINGS.values()
 }
 """Table → the column by which its rows age (Unix s)."""
 

@@ -4,7 +4,6 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from datetime import datetime
-from functools import partial
 from importlib.resources import files
 
 from fastapi import Request, Response
@@ -15,7 +14,6 @@ from markupsafe import Markup, escape
 from iveg.adapters.passwords import LEAST
 from iveg.domain.limits import LIMITS
 from iveg.domain.parameters import CLASSES, PARAMETERS
-from iveg.domain.stamps import format_stamp
 from iveg.web import cookies
 from iveg.web.pages.contexts import THEMES, Appearance, PageFrame, Site
 from iveg.web.pages.sentences import (
@@ -41,15 +39,9 @@ def rule_parameters_text() -> str:
     return json.dumps([{key: getattr(one, key) for key in keys} for one in PARAMETERS])
 
 
-def _local(stamp: str, form: str) -> str:
-    """An ISO-8601 stamp in Madrid."""
-    return f"{in_madrid(datetime.fromisoformat(stamp).timestamp()):{form}}"
-
-
-def _before(stamp: str) -> str:
-    """Ten seconds before an ISO-8601 stamp, as an address of the map of then."""
-    at = datetime.fromisoformat(stamp).timestamp()
-    return f"/?t={format_stamp(at - 10.0)}"
+def _time_of_day(stamp: str) -> str:
+    """An ISO-8601 stamp as the time in Madrid."""
+    return f"{in_madrid(datetime.fromisoformat(stamp).timestamp()):%H:%M:%S}"
 
 
 def environment_of(texts: Sentences) -> Environment:
@@ -87,20 +79,13 @@ def environment_of(texts: Sentences) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(
-        clock=partial(_local, form="%H:%M:%S"),
-        wall=partial(_local, form="%Y-%m-%d %H:%M:%S"),
-        before=_before,
-        lane=texts.lane,
-    )
+    environment.filters.update(clock=_time_of_day, lane=texts.lane)
     environment.globals.update(
         greenhouse=greenhouse,
         say_house=say_house,
         t=tell,
         say=say,
         label=label,
-        has=texts.sentences.__contains__,
-        limits=LIMITS,
         limits_text=limits_text(),
         rule_parameters=PARAMETERS,
         rule_parameters_text=rule_parameters_text(),

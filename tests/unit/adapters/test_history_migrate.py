@@ -7,7 +7,7 @@ from alembic.runtime.migration import MigrationContext
 from sqlalchemy import Connection, text
 
 from iveg.adapters.history.engine import sqlite_url, upgrade, writing_engine
-from iveg.adapters.history.tables import metadata
+from iveg.adapters.history.tables import EARLIER, metadata
 from iveg.domain.errors import DataFileError, HopError
 
 PARTS = "odometry_", "detections_"
@@ -22,7 +22,7 @@ def execute(empty_url: str, statement: str) -> None:
 
 def differences(connection: Connection) -> list[object]:
     def is_whole(name: str, kind: str, _: object) -> bool:
-        return kind != "table" or not name.startswith(PARTS)
+        return kind != "table" or not name.startswith((*PARTS, *EARLIER))
 
     opts = {"compare_type": True, "include_name": is_whole}
     migrated = MigrationContext.configure(connection, opts=opts)

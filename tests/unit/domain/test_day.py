@@ -12,7 +12,6 @@ from iveg.domain.day import (
 )
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import DriveLane, Greenhouse
-from iveg.domain.records import DecisionRecord
 from tests.fakes.records import NOON, decision_record
 
 GREENHOUSE = Greenhouse(
@@ -54,21 +53,14 @@ def test_a_slow_down_that_goes_on_counts_until_now() -> None:
 
 
 def test_encounters_are_those_with_people_and_say_how_they_went() -> None:
-    def met(foretold_s: float | None, **more: object) -> DecisionRecord:
-        said = {"reason": "person", "rule_parameters": {"foretold_s": foretold_s}}
-        return decision_record(**said, **more)
-
+    met = {"kind": "mandate", "reason": "person"}
     day = [
-        met(1.2, applied_at=NOON + 0.2),
-        met(0.8, applied_at=NOON + 0.2),
-        met(None, applied_at=NOON + 0.2),
-        met(None),
-        decision_record(reason="person", rule_parameters={}),
-        decision_record(reason="robot", rule_parameters={"foretold_s": 9.0}),
+        decision_record(**met, applied_at=NOON + 0.2),
+        decision_record(**met),
+        decision_record(kind="mandate", reason="robot", applied_at=NOON + 0.2),
     ]
 
-    assert encounter_counts(day) == EncounterCounts(5, 3, 2, 1.0)
-    assert encounter_counts([]) == EncounterCounts()
+    assert encounter_counts(day) == EncounterCounts(count=2, slowed=1)
 
 
 def test_the_closest_passes_are_of_moving_robots_and_not_one_pass_told_thrice() -> None:
