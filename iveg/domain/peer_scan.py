@@ -69,7 +69,7 @@ class PeerScan:
         return (self.ranges >= _USED_FROM_M) & (self.ranges <= self.range_max)
 
     def returns(self) -> _Floats:
-        """What came back, in ``map``; shape (m, 2), (m)."""
+        """Returns in ``map``; shape (m, 2), (m)."""
         sensor, ended = self.pose.compose(self.mount), self.ended()
         across = (self.places[ended] + 0.5) / PLACES
         bearing = sensor.yaw - math.pi + _WIDTH * (np.flatnonzero(ended) + across)
@@ -78,7 +78,7 @@ class PeerScan:
         return np.stack(found, axis=1).astype(np.float32)
 
     def without(self, refused: NDArray[np.bool_]) -> "PeerScan":
-        """The same where beams say nothing whose return (m,) is refused."""
+        """A copy in which beams say nothing whose return (m,) is refused."""
         ranges = self.ranges.copy()
         ranges[np.flatnonzero(self.ended())[refused]] = SAYS_NOTHING
         return replace(self, ranges=ranges)
@@ -98,7 +98,7 @@ class PeerScan:
 
 
 def peer_scan_of(scan: LaserScan, pose: Pose2D, age_s: float) -> PeerScan:
-    """What peers are told of a scan that was taken at ``pose`` in ``map``."""
+    """The message for peers about a scan that was taken at ``pose`` in ``map``."""
     bearing = _bearings(scan.angle_increment)
     ray = _nearest_rays(scan, bearing)
     said = np.where(ray < 0, SAYS_NOTHING, _lengths(scan)[ray])
@@ -142,5 +142,5 @@ def _nearest_rays(scan: LaserScan, bearing: NDArray[np.float64]) -> NDArray[np.i
 
 
 def _lengths(scan: LaserScan) -> _Floats:
-    """How far each ray went (m); 0 where it says nothing."""
+    """Length of each ray (m); 0 where it says nothing."""
     return np.where(scan.speaks(), scan.ranges, SAYS_NOTHING)
