@@ -9,7 +9,6 @@ from iveg.adapters import clock
 from iveg.adapters.dds_network import DdsNetwork
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.adapters.mqtt import MqttLink
 from iveg.cli.arguments import CommandCall
 from iveg.cli.nodes import broker_of, load_config, network_of, node_settings
 from iveg.cli.running import (
@@ -54,11 +53,8 @@ async def check(
 
     counts, frames = Counter[str](), dict[str, str]()
     fleet = load_fleet(settings.fleet, settings.robots)
-    address = broker_of(settings)
     with Dds(network) as dds:
         subscriptions = Subscriptions(config, dds, _CHECK_DEPTH)
-        link = MqttLink(address, f"check of {robot_id}")
-        task = asyncio.create_task(link.run(), name="broker")
         began = clock.mono()
         while clock.mono() - began < _CHECK_S:
             subscriptions.meet(dds.endpoints())
@@ -69,9 +65,6 @@ async def check(
                 frames[topic] = _frame(form, waited[-1])
                 inputs.hear(topic, waited, now.mono, form)
             inputs.tick(now)
-        broker = link.connected
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
         rows = judge(
             config,
             dds.endpoints(),
@@ -80,9 +73,6 @@ async def check(
             robot_id=robot_id,
             has_detector=fleet.of_robot(robot_id).has_detector,
         )
-    if not broker:
-        at = f"{address.host}:{address.port}"
-        rows += (CheckRow("MQTT broker", verdict=f"none at {at} (IVEG_MQTT_URL)"),)
     if robot_id not in fleet.ids:
         known = f"not in the fleet of IVEG_ROBOTS: {', '.join(fleet.ids)}"
         rows += (CheckRow(robot_id, verdict=known),)
@@ -180,7 +170,7 @@ async def refuse_second_gate(
     began = clock.mono()
     await asyncio.sleep(discovery_s)
     while any(
-        one.writes and one.topic == topic and not one.own for one in dds.endpoints()
+        end.writes and end.topic == topic and not end.own for end in dds.endpoints()
     ):
         if clock.mono() - began > ghost_s:
             detail = (

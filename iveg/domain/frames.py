@@ -80,7 +80,7 @@ def frame_named(name: str, robot_id: str, camera: str | None = None) -> Frame | 
     if camera is not None and camera in whole:
         is_optical = camera.endswith(("_optical", "_optical_frame"))
         return "camera_optical_frame" if is_optical else "camera_link"
-    return next((_NAMED[one] for one in whole if one in _NAMED), None)
+    return next((_NAMED[name] for name in whole if name in _NAMED), None)
 
 
 def is_pose_frame(name: str, robot: RobotDescription) -> bool:

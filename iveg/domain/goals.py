@@ -129,7 +129,7 @@ def place_of(
                 return "no_start"
             place = start.x, start.y
         case "aisle":
-            lanes = (one for one in greenhouse.lanes if one.label == wish.aisle)
+            lanes = (lane for lane in greenhouse.lanes if lane.label == wish.aisle)
             lane = next(lanes, None)
             if lane is None:
                 return "no_such_aisle"
@@ -148,10 +148,12 @@ def _obstructed(
         return "outside"
     if any(row.contains(x, y, keep_off_m) for row in greenhouse.rows):
         return "in_plants"
-    things = any(one.area.contains(x, y, keep_off_m) for one in greenhouse.obstacles)
+    things = any(
+        thing.area.contains(x, y, keep_off_m) for thing in greenhouse.obstacles
+    )
     posts = any(
-        Pose2D(one.x, one.y, 0.0).distance_to(x, y) <= one.radius + keep_off_m
-        for one in greenhouse.posts
+        Pose2D(post.x, post.y, 0.0).distance_to(x, y) <= post.radius + keep_off_m
+        for post in greenhouse.posts
     )
     return "obstacle" if things or posts else None
 
@@ -199,11 +201,11 @@ _TABLE: Mapping[tuple[GoalState, GoalEvent], GoalState] = {
     ("UNCONFIRMED", "refused"): "REFUSED",
     ("CANCELLING", "refused"): "REFUSED",
     ("CANCELLING", "expired"): "UNCONFIRMED",
-    **{(one, "reached"): "REACHED" for one in ("SENT", "DRIVING", "UNCONFIRMED")},
-    **{(one, "cancel"): "CANCELLING" for one in ("SENT", "DRIVING", "UNCONFIRMED")},
-    **{(one, "dropped"): "CANCELLED" for one in OPEN_STATES},
-    **{(one, "held"): "DELETED" for one in OPEN_STATES},
-    **{(one, "replaced"): "REPLACED" for one in OPEN_STATES},
+    **{(state, "reached"): "REACHED" for state in ("SENT", "DRIVING", "UNCONFIRMED")},
+    **{(state, "cancel"): "CANCELLING" for state in ("SENT", "DRIVING", "UNCONFIRMED")},
+    **{(state, "dropped"): "CANCELLED" for state in OPEN_STATES},
+    **{(state, "held"): "DELETED" for state in OPEN_STATES},
+    **{(state, "replaced"): "REPLACED" for state in OPEN_STATES},
 }
 
 
@@ -302,8 +304,8 @@ def _own_clock(robot: RobotState, report: SafetyReport) -> float | None:
     """The newest moment of the robot's own clock that it told (s), in this boot."""
     origins = [report.origin, *([robot.odometry.origin] if robot.odometry else [])]
     moments = [
-        one.mono
-        for one in origins
-        if one.mono is not None and one.boot == report.origin.boot
+        origin.mono
+        for origin in origins
+        if origin.mono is not None and origin.boot == report.origin.boot
     ]
     return max(moments, default=None)

@@ -78,7 +78,7 @@ class PeerScan:
         return np.stack(found, axis=1).astype(np.float32)
 
     def without(self, refused: NDArray[np.bool_]) -> "PeerScan":
-        """Scan without the beams whose return (m,) is refused."""
+        """A copy in which beams say nothing whose return (m,) is refused."""
         ranges = self.ranges.copy()
         ranges[np.flatnonzero(self.ended())[refused]] = SAYS_NOTHING
         return replace(self, ranges=ranges)
@@ -98,7 +98,7 @@ class PeerScan:
 
 
 def peer_scan_of(scan: LaserScan, pose: Pose2D, age_s: float) -> PeerScan:
-    """Scan taken at ``pose`` in ``map``, in the form for peers."""
+    """The message for peers about a scan that was taken at ``pose`` in ``map``."""
     bearing = _bearings(scan.angle_increment)
     ray = _nearest_rays(scan, bearing)
     said = np.where(ray < 0, SAYS_NOTHING, _lengths(scan)[ray])

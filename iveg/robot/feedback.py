@@ -255,11 +255,13 @@ class PeerFeedback:
     ) -> None:
         received = alerts_of(feedback)
         kept = {
-            key: one for key, one in topic.alerts.items() if is_alive(one, topic, now)
+            key: known
+            for key, known in topic.alerts.items()
+            if is_alive(known, topic, now)
         }
-        for key, one in kept.items():
-            if key not in received and one.missing_since is None:
-                kept[key] = replace(one, missing_since=now)
+        for key, known in kept.items():
+            if key not in received and known.missing_since is None:
+                kept[key] = replace(known, missing_since=now)
         for key, alert in received.items():
             myself = self._is_me(alert, topic, own, kept.get(key))
             kept[key] = KeptAlert(alert, now, None, myself)
@@ -400,27 +402,31 @@ class Authors:
         Once all are forgotten, the last one's; empty before the first.
         """
         self._forget(now)
-        kept = tuple(FeedbackRef(one.boot, one.newest) for one in self._kept)
+        kept = tuple(FeedbackRef(author.boot, author.newest) for author in self._kept)
         return kept or (() if self._newest is None else (self._newest,))
 
     def backlog_s(self) -> float | None:
         """Largest backlog of Orion that an author tells (s); None where none does."""
-        told = (one.backlog_s for one in self._kept)
-        return max((one for one in told if one is not None), default=None)
+        told = (author.backlog_s for author in self._kept)
+        return max(
+            (backlog_s for backlog_s in told if backlog_s is not None), default=None
+        )
 
     def caps(self, own: Pose2D | None, slowed: bool, now: float) -> Iterator[Cap]:
         """All caps of all authors; arguments as of :meth:`PeerFeedback.caps`."""
         self._forget(now)
-        for one in self._kept:
-            if one.is_silent(self._slow_s, now):
+        for author in self._kept:
+            if author.is_silent(self._slow_s, now):
                 yield _SILENT
-            yield from one.peer_feedback.caps(own, slowed, now)
+            yield from author.peer_feedback.caps(own, slowed, now)
         if now - self._crowded_at <= LIMITS.zone_lasts_s:
             yield _SILENT
 
     def ahead(self, now: float) -> Iterable[Ahead]:
         """Zones whose motion is known, where an author's rule looks ahead."""
-        return chain.from_iterable(one.peer_feedback.ahead(now) for one in self._kept)
+        return chain.from_iterable(
+            author.peer_feedback.ahead(now) for author in self._kept
+        )
 
     def peers(self, now: float) -> Iterable[KnownPeer]:
         """Peers; none where two authors speak, as they explain obstacles."""
@@ -439,28 +445,30 @@ class Authors:
 
     def _forget(self, now: float) -> None:
         last = now - LIMITS.zone_lasts_s
-        if any(one.spoke_at < last for one in self._kept):
-            self._kept = [one for one in self._kept if one.spoke_at >= last]
+        if any(author.spoke_at < last for author in self._kept):
+            self._kept = [author for author in self._kept if author.spoke_at >= last]
 
     def _named(self, boot: str) -> Iterator[Author]:
-        return (one for one in self._kept if one.boot == boot)
+        return (author for author in self._kept if author.boot == boot)
 
     def _is_copy(self, topic: str, feedback: Feedback, boot: str, seq: int) -> bool:
         return any(
-            seq <= one.peer_feedback.newest(topic) and feedback in one.recent
-            for one in self._named(boot)
+            seq <= author.peer_feedback.newest(topic) and feedback in author.recent
+            for author in self._named(boot)
         )
 
     def _author_of(self, topic: str, boot: str, seq: int, now: float) -> Author | None:
         """Author whose count this goes on, or a new one; None: there is no room."""
         counts = [
-            one for one in self._named(boot) if seq > one.peer_feedback.newest(topic)
+            author
+            for author in self._named(boot)
+            if seq > author.peer_feedback.newest(topic)
         ]
         if counts:
-            return min(counts, key=lambda one: abs(seq - one.newest))
+            return min(counts, key=lambda author: abs(seq - author.newest))
         if len(self._kept) >= MOST_AUTHORS:
             self._crowded_at = now
-            quiet = min(self._kept, key=lambda one: one.spoke_at)
+            quiet = min(self._kept, key=lambda author: author.spoke_at)
             if now - quiet.spoke_at <= LIMITS.silence_s:
                 return None
             self._kept.remove(quiet)

@@ -130,7 +130,7 @@ class Lookahead:
 
     def note_path(self, path: Plan, now: float) -> None:
         """Note the robot's own plan (monotonic, s); one that is no number is none."""
-        is_read = all(math.isfinite(one) for point in path for one in point)
+        is_read = all(math.isfinite(number) for point in path for number in point)
         self._plan, self._plan_at = path if is_read else None, now
 
     def is_due(self, now: float) -> bool:
@@ -152,7 +152,11 @@ class Lookahead:
         def met(speed: float, within_s: float) -> set[Cap]:
             """Caps of the zones that it reaches so soon at this speed (m/s)."""
             _, meetings = zones.met_by(path_ahead(pose, sped_up(twist, speed), plan))
-            return {ahead[one.zone][1] for one in meetings if one.in_s <= within_s}
+            return {
+                ahead[meeting.zone][1]
+                for meeting in meetings
+                if meeting.in_s <= within_s
+            }
 
         due, held = met(speed, slows_within_s(self._braking, speed)), set[Cap]()
         if self._caps:

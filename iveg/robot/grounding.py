@@ -341,11 +341,11 @@ def frame_of(
     A target that is sure enough and still has no place counts as unread: that
     somebody is there and nobody knows where must not look like an empty frame.
     """
-    found = tuple(one for _, one in answers if isinstance(one, Detection))
+    found = tuple(answer for _, answer in answers if isinstance(answer, Detection))
     lost = tuple(
         class_id
-        for class_id, one in answers
-        if one != "unsure" and not isinstance(one, Detection)
+        for class_id, answer in answers
+        if answer != "unsure" and not isinstance(answer, Detection)
     )
     return DetectionFrame("", UNKNOWN_ORIGIN, found, lost)
 

@@ -148,11 +148,11 @@ class Judgement:
                 self._silence_cap(now),
                 self._obstacle_cap(now),
                 self._foreseen_cap(now),
-                *(one for one in peer_caps if one.waits),
+                *(cap for cap in peer_caps if cap.waits),
             )
         )
         self._waited = self._waited.settle(raw, now)
-        ends_late = (one for one in peer_caps if not one.waits)
+        ends_late = (cap for cap in peer_caps if not cap.waits)
         self.cap = lowest((self._waited.cap, *ends_late))
 
     def must_stand(self, now: float) -> bool:

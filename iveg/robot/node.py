@@ -256,20 +256,25 @@ class RobotNode:
         """Take observations of the robot's own sensors; origins are filled in."""
         now = self._read_clock()
         mono = now.mono
-        for one in observations:
-            if isinstance(one, Odometry):
-                self._placed = one.pose, mono
-                self._perform(self.machine.odometry(one.pose, one.twist, mono), mono)
-            elif isinstance(one, LaserScan) and not self._is_replay:
-                self._perform(self.machine.scan(one, mono), mono)
-            elif isinstance(one, Navigation):
-                self.machine.note_path(one.path, mono)
-            elif isinstance(one, Unplaced) and one.twist is not None:
-                self._perform(self.machine.odometry(None, one.twist, mono), mono)
+        for observation in observations:
+            if isinstance(observation, Odometry):
+                self._placed = observation.pose, mono
+                self._perform(
+                    self.machine.odometry(observation.pose, observation.twist, mono),
+                    mono,
+                )
+            elif isinstance(observation, LaserScan) and not self._is_replay:
+                self._perform(self.machine.scan(observation, mono), mono)
+            elif isinstance(observation, Navigation):
+                self.machine.note_path(observation.path, mono)
+            elif isinstance(observation, Unplaced) and observation.twist is not None:
+                self._perform(
+                    self.machine.odometry(None, observation.twist, mono), mono
+                )
         if self._link.connected:
             own = self._own(now)
-            for one in observations:
-                self._uplink.send(one, own)
+            for observation in observations:
+                self._uplink.send(observation, own)
 
     def request_twist(self, twist: Twist2D) -> None:
         """Take upstream navigation's ``cmd_vel``; it expires after 0.5 s."""

@@ -105,8 +105,8 @@ def read_desired_state(payload: bytes) -> tuple[str, ...] | None:
     if not isinstance(level, dict) or level.get("desired") != "stopped":
         return None
     ids = level.get("ids")
-    usable = [_usable_id(one) for one in ids] if isinstance(ids, list) else []
-    return tuple(one for one in usable[:_MAX_NAMED] if one is not None)
+    usable = [_usable_id(name) for name in ids] if isinstance(ids, list) else []
+    return tuple(name for name in usable[:_MAX_NAMED] if name is not None)
 
 
 def _speaks_of_stop(value: object) -> bool:

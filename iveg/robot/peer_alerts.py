@@ -115,7 +115,11 @@ class RuleRadii:
         """Note what one message told."""
         for class_, radius_m in radii.items():
             told = self._told.get(class_, [])
-            larger = [one for one in told if one[1] > radius_m and _counts(one, now)]
+            larger = [
+                earlier
+                for earlier in told
+                if earlier[1] > radius_m and _counts(earlier, now)
+            ]
             self._told[class_] = [*larger, (now, radius_m)]
 
     @property
@@ -131,7 +135,9 @@ class RuleRadii:
         told = self._told.get(class_)
         if not told:
             return LIMITS.zone_default_m
-        return next((one[1] for one in told if _counts(one, now)), told[-1][1])
+        return next(
+            (earlier[1] for earlier in told if _counts(earlier, now)), told[-1][1]
+        )
 
 
 def _counts(told: tuple[float, float], now: float) -> bool:

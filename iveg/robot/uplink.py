@@ -45,7 +45,7 @@ from iveg.robot.holds import HoldSet
 TOP_HZ = 30.0
 FLOOR_HZ = dict(
     sorted(
-        ((one.suffix or "", one.floor_hz) for one in MEASURED if one.floor_hz),
+        ((kind.suffix or "", kind.floor_hz) for kind in MEASURED if kind.floor_hz),
         key=itemgetter(1),
     )
 )
@@ -367,8 +367,11 @@ def _seen(frame: DetectionFrame) -> tuple[tuple[str, int], ...]:
     """Classes of a frame with their confidence: below 0.5, below 0.8, above."""
     return tuple(
         sorted(
-            (one.class_id, (one.probability >= 0.5) + (one.probability >= 0.8))
-            for one in frame.detections
+            (
+                detection.class_id,
+                (detection.probability >= 0.5) + (detection.probability >= 0.8),
+            )
+            for detection in frame.detections
         )
     )
 

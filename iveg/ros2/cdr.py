@@ -30,7 +30,7 @@ def read(message: type[Message], payload: bytes) -> Any:
             if form is message:
                 return found
             kind: Any = message
-            return kind(*(getattr(found, one.name) for one in fields(kind)))
+            return kind(*(getattr(found, member.name) for member in fields(kind)))
     raise UnreadableError("unreadable", f"{message.ROS} of {len(payload)} bytes")
 
 

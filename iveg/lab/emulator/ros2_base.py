@@ -242,14 +242,14 @@ def _link(
     return ros.TransformStamped(ros.Header(stamp, outer), inner, transform)
 
 
-def _detection(one: Detection, header: ros.Header) -> ros.Detection3D:
-    box, (x, y, z) = one.box, one.box.centre
+def _detection(found: Detection, header: ros.Header) -> ros.Detection3D:
+    box, (x, y, z) = found.box, found.box.centre
     size = ros.Vector3(box.xmax - box.xmin, box.ymax - box.ymin, box.zmax - box.zmin)
-    sure = ros.ObjectHypothesis(one.class_id, one.probability)
+    sure = ros.ObjectHypothesis(found.class_id, found.probability)
     centre = ros.Pose(ros.Point(x, y, z))
     return ros.Detection3D(
         header,
         (ros.ObjectHypothesisWithPose(sure, ros.PoseWithCovariance(centre)),),
         ros.BoundingBox3D(centre, size),
-        one.det_id or "",
+        found.det_id or "",
     )

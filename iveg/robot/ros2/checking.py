@@ -41,7 +41,7 @@ class Lookout:
 
     def look(self, endpoints: Iterable[Endpoint], now: float) -> None:
         """Judge the endpoints of this moment."""
-        for code, about in self._faults([one for one in endpoints if not one.own], now):
+        for code, about in self._faults([end for end in endpoints if not end.own], now):
             self._input_faults.note(code, about, now)
 
     def _faults(
@@ -189,7 +189,7 @@ def _badness(
         return f"nobody publishes it ({row.message.ROS})" if needed else ""
     if topic == "cmd_vel_out":
         return ""
-    if topic == "cmd_vel_in" and twist.ROS not in {one.type for one in ends}:
+    if topic == "cmd_vel_in" and twist.ROS not in {end.type for end in ends}:
         return f"not {twist.ROS}: drive.stamped_in"
     for end in ends:
         form = row.form(end.type)
@@ -204,13 +204,13 @@ def _badness(
 
 def _unnamed(names: Mapping[str, str], others: Sequence[Endpoint]) -> list[CheckRow]:
     """Detectors on topics that the file does not name, unless it names a live one."""
-    found = {one.topic: one for one in others if one.writes}
+    found = {end.topic: end for end in others if end.writes}
     if any(names[key] in found for key in _DETECTORS):
         return []
     return [
-        _row(topic, [one], 0.0, "", f"a detector's: topics.{' or topics.'.join(keys)}")
-        for topic, one in sorted(found.items())
-        if (keys := [key for key in _DETECTORS if TOPICS[key].form(one.type)])
+        _row(topic, [end], 0.0, "", f"a detector's: topics.{' or topics.'.join(keys)}")
+        for topic, end in sorted(found.items())
+        if (keys := [key for key in _DETECTORS if TOPICS[key].form(end.type)])
     ]
 
 

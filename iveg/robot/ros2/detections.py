@@ -188,26 +188,26 @@ class Boxes:
         """The detection frame of a message of one of ``BOXES``; ``now`` monotonic."""
         found = BOXES[type(message)](message)
         usual, stamp = found.header.frame_id, found.header.stamp.seconds
-        frames = dict.fromkeys(one.header.frame_id or usual for one in found.detections)
+        frames = dict.fromkeys(box.header.frame_id or usual for box in found.detections)
         places = {frame: self._places.in_map(frame, stamp, now) for frame in frames}
         answers = [
-            self._detection(one, places[one.header.frame_id or usual], now)
-            for one in found.detections
+            self._detection(box, places[box.header.frame_id or usual], now)
+            for box in found.detections
         ]
         return frame_of(answers)
 
     def _detection(
-        self, one: ros.Detection3D, place: RigidTransform | None, now: float
+        self, box: ros.Detection3D, place: RigidTransform | None, now: float
     ) -> tuple[str | None, Detection | Ungrounded]:
         """A detection, or that it has no place, and the class that it is of."""
         if place is not None:
             try:
-                found = reading.read_detection(one, place)
+                found = reading.read_detection(box, place)
             except UnreadableError as error:
                 self._input_faults.note(error.reason, self._topic, now)
             else:
                 return found.class_id, found
-        return reading.class_id_of(one.results), "unreadable"
+        return reading.class_id_of(box.results), "unreadable"
 
 
 # --- pictures ---------------------------------------------------------------------
@@ -239,7 +239,9 @@ def nearest(
 ) -> ros.Image | None:
     """The picture of a stamp, within ``within_s``."""
     best = min(
-        pictures, key=lambda one: abs(one.header.stamp.seconds - stamp), default=None
+        pictures,
+        key=lambda picture: abs(picture.header.stamp.seconds - stamp),
+        default=None,
     )
     if best is None or abs(best.header.stamp.seconds - stamp) > within_s:
         return None
@@ -313,10 +315,10 @@ def grounded(
     owners = None if mask is None else _pixels(mask, _MASKS.get(mask.encoding, "u1"))
     answers = [
         (
-            class_id_of(one.results),
-            _place(number, one, picture, owners, place, settings),
+            class_id_of(box.results),
+            _place(number, box, picture, owners, place, settings),
         )
-        for number, one in enumerate(look.detections, 1)
+        for number, box in enumerate(look.detections, 1)
     ]
     return frame_of(answers)
 
@@ -453,7 +455,7 @@ class Camera:
         frame = None if depth is None else self._located(look, depth, now)
         if incomplete:
             self._input_faults.note("no_depth", self._names["detections_2d"], now)
-        lost = (class_id_of(one.results) for one in look.detections)
+        lost = (class_id_of(box.results) for box in look.detections)
         return frame or DetectionFrame("", UNKNOWN_ORIGIN, (), tuple(lost))
 
     def _located(

@@ -131,7 +131,7 @@ class SensorInputs:
         self._works: dict[str, _Work] = {
             "odometry": self._odometry,
             "scan": self._scan,
-            "detections_3d": lambda one, now: self._boxes.locate(one, now.mono),
+            "detections_3d": lambda found, now: self._boxes.locate(found, now.mono),
             "depth": self._camera.add_depth,
             "mask": self._camera.add_mask,
             "camera_info": self._camera.set_info,
@@ -193,7 +193,7 @@ class SensorInputs:
             if (newest := self._newest.pop(topic, None)) is not None
         ]
         found.append(self._camera.locate(now.mono))
-        return [one for one in found if one is not None]
+        return [observation for observation in found if observation is not None]
 
     def _note_silence(self, began: float, now: float) -> None:
         # A robot may lack a laser; one whose laser says nothing new has a fault.

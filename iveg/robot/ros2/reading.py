@@ -91,7 +91,7 @@ def read_scan(scan: ros.LaserScan, laser: RigidTransform) -> LaserScan:
     if count > MAX_BEAMS:
         raise UnreadableError("too_many_beams", f"{count}")
     numbers = scan.angle_min, scan.angle_increment, scan.range_min
-    if not all(math.isfinite(one) and abs(one) <= 1e4 for one in numbers):
+    if not all(math.isfinite(number) and abs(number) <= 1e4 for number in numbers):
         raise UnreadableError("not_a_number", "a sweep")
     turns = abs(scan.angle_increment) >= _FINEST_RAD
     if not turns or not max(0.0, scan.range_min) < scan.range_max:
@@ -168,7 +168,7 @@ def read_hypothesis(
         raise UnreadableError("no_class", "a detection without a hypothesis")
     best = results[0].hypothesis
     if len(results) > 1:
-        best = max((one.hypothesis for one in results), key=_score)
+        best = max((result.hypothesis for result in results), key=_score)
     if not 0.0 <= best.score <= 1.0:
         raise UnreadableError("bad_probability", f"{best.score}")
     name = clean(best.class_id)
@@ -299,7 +299,7 @@ class InputFaults:
         fresh = before is None or now - before.last > LASTS_S
         since = now if fresh or before is None else before.since
         if fresh and len(self._noted) >= _MOST:
-            del self._noted[min(self._noted, key=lambda one: self._noted[one].last)]
+            del self._noted[min(self._noted, key=lambda key: self._noted[key].last)]
         self._noted[key] = _Noted(since, now, for_s)
 
     def clear(self) -> None:
@@ -311,11 +311,15 @@ class InputFaults:
         if not self._noted:
             return ()
         self._noted = {
-            key: one for key, one in self._noted.items() if now - one.last <= LASTS_S
+            key: fault
+            for key, fault in self._noted.items()
+            if now - fault.last <= LASTS_S
         }
         return tuple(
-            RobotFault(code, about, now - one.since if one.for_s is None else one.for_s)
-            for (code, about), one in self._noted.items()
+            RobotFault(
+                code, about, now - fault.since if fault.for_s is None else fault.for_s
+            )
+            for (code, about), fault in self._noted.items()
         )
 
 

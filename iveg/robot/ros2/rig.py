@@ -158,7 +158,7 @@ class Ros2Robot:
 
     def _log(self, faults: tuple[RobotFault, ...]) -> None:
         """Log each fault once at its start and once at its end."""
-        said = frozenset((one.code, one.about) for one in faults)
+        said = frozenset((fault.code, fault.about) for fault in faults)
         for code, about in said - self._said:
             _log.warning("%s: %s, %s", self._id, code, about)
         for code, about in self._said - said:

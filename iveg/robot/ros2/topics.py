@@ -115,32 +115,32 @@ def _vision(look: ros.Detection2DArray) -> Look:
 def _yolox(look: d.BoundingBoxes) -> Look:
     boxes, own = look.bounding_boxes, look.image_header
     header = own if own.frame_id or own.stamp != ros.Time() else look.header
-    width = max((one.img_width for one in boxes), default=0)
-    height = max((one.img_height for one in boxes), default=0)
+    width = max((box.img_width for box in boxes), default=0)
+    height = max((box.img_height for box in boxes), default=0)
     return Look(header, tuple(map(_yolox_box, boxes)), width, height)
 
 
-def _yolox_box(one: d.BoundingBox) -> ros.Detection2D:
+def _yolox_box(seen: d.BoundingBox) -> ros.Detection2D:
     xmin, ymin, xmax, ymax = (
         float(edge - _WRAP if edge >= _SIGN else edge)
-        for edge in (one.xmin, one.ymin, one.xmax, one.ymax)
+        for edge in (seen.xmin, seen.ymin, seen.xmax, seen.ymax)
     )
     centre = ros.Point2D((xmin + xmax) / 2, (ymin + ymax) / 2)
     box = ros.BoundingBox2D(ros.PicturePose(centre), xmax - xmin, ymax - ymin)
-    return ros.Detection2D(ros.Header(), _sure(one.class_id, one.probability), box)
+    return ros.Detection2D(ros.Header(), _sure(seen.class_id, seen.probability), box)
 
 
 def _yolo(look: d.DetectionArray) -> Look:
     return Look(look.header, tuple(map(_yolo_box, look.detections)))
 
 
-def _yolo_box(one: d.Detection) -> ros.Detection2D:
-    centre, size = one.bbox.center, one.bbox.size
+def _yolo_box(seen: d.Detection) -> ros.Detection2D:
+    centre, size = seen.bbox.center, seen.bbox.size
     place = ros.PicturePose(
         ros.Point2D(centre.position.x, centre.position.y), centre.theta
     )
     box = ros.BoundingBox2D(place, size.x, size.y)
-    return ros.Detection2D(ros.Header(), _yolo_class(one), box, one.id)
+    return ros.Detection2D(ros.Header(), _yolo_class(seen), box, seen.id)
 
 
 def _yolo_3d(found: d.DetectionArray) -> ros.Detection3DArray:
@@ -149,17 +149,17 @@ def _yolo_3d(found: d.DetectionArray) -> ros.Detection3DArray:
     )
 
 
-def _yolo_box_3d(one: d.Detection) -> ros.Detection3D:
-    box = one.bbox3d
+def _yolo_box_3d(seen: d.Detection) -> ros.Detection3D:
+    box = seen.bbox3d
     # Without a frame no node has added depth, and zeros are no place.
     centre = box.center if box.frame_id else ros.Pose(ros.Point(math.nan))
     header = ros.Header(frame_id=box.frame_id)
     found = ros.BoundingBox3D(centre, box.size)
-    return ros.Detection3D(header, _yolo_class(one), found, one.id)
+    return ros.Detection3D(header, _yolo_class(seen), found, seen.id)
 
 
-def _yolo_class(one: d.Detection) -> tuple[ros.ObjectHypothesisWithPose, ...]:
-    return _sure(one.class_name or str(one.class_id), one.score)
+def _yolo_class(seen: d.Detection) -> tuple[ros.ObjectHypothesisWithPose, ...]:
+    return _sure(seen.class_name or str(seen.class_id), seen.score)
 
 
 def _yolact(found: d.BoundingBoxes3d) -> ros.Detection3DArray:
@@ -168,15 +168,17 @@ def _yolact(found: d.BoundingBoxes3d) -> ros.Detection3DArray:
     )
 
 
-def _yolact_box(one: d.BoundingBox3d) -> ros.Detection3D:
+def _yolact_box(seen: d.BoundingBox3d) -> ros.Detection3D:
     centre = ros.Point(
-        (one.xmin + one.xmax) / 2,
-        (one.ymin + one.ymax) / 2,
-        (one.zmin + one.zmax) / 2,
+        (seen.xmin + seen.xmax) / 2,
+        (seen.ymin + seen.ymax) / 2,
+        (seen.zmin + seen.zmax) / 2,
     )
-    size = ros.Vector3(one.xmax - one.xmin, one.ymax - one.ymin, one.zmax - one.zmin)
+    size = ros.Vector3(
+        seen.xmax - seen.xmin, seen.ymax - seen.ymin, seen.zmax - seen.zmin
+    )
     box = ros.BoundingBox3D(ros.Pose(centre), size)
-    return ros.Detection3D(ros.Header(), _sure(one.object_name, one.probability), box)
+    return ros.Detection3D(ros.Header(), _sure(seen.object_name, seen.probability), box)
 
 
 def _sure(class_id: str, score: float) -> tuple[ros.ObjectHypothesisWithPose, ...]:
@@ -232,7 +234,7 @@ class RosTopic:
 
     def form(self, ros_type: str) -> type[Message] | None:
         """The type of this ROS name; None for one that is not read."""
-        return next((one for one in self.forms if ros_type == one.ROS), None)
+        return next((form for form in self.forms if ros_type == form.ROS), None)
 
 
 TOPICS: Mapping[str, RosTopic] = {
@@ -247,7 +249,10 @@ TOPICS: Mapping[str, RosTopic] = {
     "camera_info": RosTopic("camera/color/camera_info", ros.CameraInfo),
     # In a mono picture value n marks the n-th detection; without, the whole box counts.
     "mask": RosTopic("", ros.Image, "picture"),
-    **{name: RosTopic(one.topic, one.message) for name, one in ROS_SENSORS.items()},
+    **{
+        name: RosTopic(sensor.topic, sensor.message)
+        for name, sensor in ROS_SENSORS.items()
+    },
     "path": RosTopic("plan", ros.Path),
     # After a pause each datum finds the transform that was published before it, though
     # both arrive while the topics are being read.
