@@ -13,10 +13,9 @@ _TO_DO = """
     adapters/mqtt adapters/oidc adapters/passwords adapters/toml_files
     adapters/worker app/door cli/robot comfort/messenger comfort/shadow_run
     domain/accounts domain/audit domain/kinds domain/observations domain/peer_scan
-    domain/probe domain/quantities domain/transports lab/commands/experiment
-    lab/emulator/scenarios lab/emulator/world
-    lab/experiment/protection lab/experiment/report lab/experiment/scoring
-    lab/experiment/stage lab/experiment/tables ngsi/codec/attributes
+    domain/probe domain/quantities domain/transports
+   
+    ngsi/codec/attributes
     ngsi/codec/feedback setting_types settings vital/__init__ vital/evaluate
     vital/event_log vital/log_messages vital/supervision web/api/account
     web/api/goals web/build web/live/pictures web/pages/signing web/refusals
