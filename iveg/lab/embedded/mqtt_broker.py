@@ -235,8 +235,7 @@ class BrokerClient(asyncio.Protocol):
         self.filters: dict[str, int] = {}
         self._broker = broker
         self._number = 0
-        self._held = bytearray()
-        self._needed = 0
+        self._rest = b""
 
     @property
     def unsent(self) -> int:
@@ -267,18 +266,13 @@ class BrokerClient(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Handle complete packets; keep the rest."""
-        if self._held:
-            self._held += data
-            if len(self._held) < self._needed:
-                return
-            data = bytes(self._held)
-        start = needed = 0
+        data = self._rest + data
+        start = 0
         while not self.transport.is_closing():
             body, end = packet_bounds(data, start)
             if end - start > LARGEST_PACKET:
                 self.transport.abort()
             elif not body or end > len(data):
-                needed = end - start
                 break
             else:
                 try:
@@ -286,7 +280,7 @@ class BrokerClient(asyncio.Protocol):
                 except (ValueError, IndexError):
                     self.transport.abort()
                 start = end
-        self._held, self._needed = bytearray(data[start:]), needed
+        self._rest = data[start:]
 
     # --- packets of the client --------------------------------------------------
 

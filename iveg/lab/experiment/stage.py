@@ -106,7 +106,7 @@ class StagedRobot:
     """One rig with its safety machine, whose effects are executed at once.
 
     Args:
-        hear: Called with the topic and payload of its messages.
+        publish: Called with the topic and payload of its messages.
         looked: Called when its camera has taken a picture.
         scan_every: Steps between two sweeps of its laser; 0: none.
         plan: What stands in the greenhouse.
@@ -117,7 +117,7 @@ class StagedRobot:
         self,
         rig: RobotHardware,
         now: Instant,
-        hear: Callable[[str, bytes], None],
+        publish: Callable[[str, bytes], None],
         looked: Looked = lambda _: None,
         scan_every: int = 0,
         plan: Plan | None = None,
@@ -126,13 +126,13 @@ class StagedRobot:
     ) -> None:
         texts = count(1)
         self._rig = rig
-        self._hear = hear
+        self._publish = publish
         self._looked = looked
         self._scan_every = scan_every
         self._is_witness = is_witness
         self._wanted = 0.0
-        self._heard: tuple[FeedbackRef, ...] = ()
-        origins = Origins("b1", echoes=lambda: self._heard)
+        self._echoes: tuple[FeedbackRef, ...] = ()
+        origins = Origins("b1", echoes=lambda: self._echoes)
         self._uplink = Uplink(rig.robot_id, "iveg", origins, self._say)
         self._machine = SafetyMachine(
             rig.robot_id,
@@ -193,7 +193,7 @@ class StagedRobot:
         """Take iVeg's feedback to a robot of the fleet."""
         feedback = codec.read_feedback(payload)
         effects = self._machine.feedback(topic, feedback, now.mono)
-        self._heard = self._machine.authors.echoes(now.mono)
+        self._echoes = self._machine.authors.echoes(now.mono)
         self._perform(effects, now)
 
     def order(self, payload: bytes, now: Instant) -> None:
@@ -226,7 +226,7 @@ class StagedRobot:
 
     def _say(self, topic: str, payload: bytes) -> None:
         if not self._rig.faults.mute:
-            self._hear(topic, payload)
+            self._publish(topic, payload)
 
 
 class Stage:
@@ -235,7 +235,7 @@ class Stage:
     Args:
         feedback: Feedback that iVeg has published; it grows.
         move_clock: Advances the clock by seconds; returns the time.
-        hear: Called with each message of a robot, from its creation on.
+        publish: Called with each message of a robot, from its creation on.
         looked, scan_every, plan, is_witness: As for ``StagedRobot``.
 
     Attributes:
@@ -249,7 +249,7 @@ class Stage:
         loop: RuleLoop,
         feedback: Sequence[Feedback],
         move_clock: Callable[[float], Instant],
-        hear: Callable[[str, bytes], None],
+        publish: Callable[[str, bytes], None],
         *,
         looked: Looked = lambda _: None,
         scan_every: int = 0,
@@ -262,7 +262,7 @@ class Stage:
         self.now = move_clock(0.0)
         self.robots = {
             robot_id: StagedRobot(
-                rig, self.now, hear, looked, scan_every, plan, is_witness=is_witness
+                rig, self.now, publish, looked, scan_every, plan, is_witness=is_witness
             )
             for robot_id, rig in world.rigs.items()
         }
@@ -361,10 +361,10 @@ class VirtualRun:
 
 
 def foretold_row(iveg: VirtualPipeline, truth: Row) -> Row:
-    """Encounters with people that iVeg tells now of the robot of a row of the truth."""
+    """Encounters with people that iVeg publishes now of the robot of a true picture."""
     people = [
-        {"x": round(one.zone.x, 3), "y": round(one.zone.y, 3)}
-        for one in iveg.parts.evaluator.encounters(truth["robot"], iveg.now)
-        if one.zone.reason == "person"
+        {"x": round(encounter.zone.x, 3), "y": round(encounter.zone.y, 3)}
+        for encounter in iveg.parts.evaluator.encounters(truth["robot"], iveg.now)
+        if encounter.zone.reason == "person"
     ]
     return {"robot": truth["robot"], "at": truth["at"], "people": people}
