@@ -48,7 +48,7 @@ class IotAgentClient(FiwareHttp):
         Raises:
             HopError: the agent does not answer.
         """
-        return await self.read_all("/iot/devices", {}, "devices")
+        return await self.read_all("/iot/devices", part="devices")
 
     async def create_device(self, device: Document) -> bool:
         """Make a device; False where there is one with this id already.

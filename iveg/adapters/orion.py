@@ -87,7 +87,7 @@ class OrionClient(FiwareHttp):
             "type": names.ROBOT_TYPE,
             "attrs": ",".join(ROBOT_ATTRIBUTES),
             "orderBy": "id",
-            "options": "skipForwarding,count",
+            "options": "skipForwarding",
         }
         return await self.read_all("/v2/entities", query)
 

@@ -1,6 +1,5 @@
 """What people's safety needs is read from MQTT without FIWARE."""
 
-import orjson
 import pytest
 
 from iveg.adapters.direct import DirectReader
@@ -122,17 +121,6 @@ def test_f30_an_apostrophe_that_orion_refuses_costs_nobody_their_ring() -> None:
     )
 
     assert len(bench.offered) == 1
-
-
-def test_f27_a_report_with_a_number_that_is_none_is_counted() -> None:
-    bench = Bench()
-    value = {"speed_factor": 1, "reason": "clear", "v": "here"}
-    payload = orjson.dumps({"safety_state": value}).replace(b'"here"', b"NaN")
-
-    bench.reader.read("/iveg/AGI_safety/attrs", payload)
-
-    assert bench.offered == []
-    assert len(bench.rejected) == 1
 
 
 def test_what_the_broker_had_retained_is_no_news_and_counted_by_name() -> None:

@@ -27,15 +27,6 @@ def test_a_second_holder_is_refused_by_name_and_process(tmp_path: Path) -> None:
         lease(file, "AGI").__enter__()
 
 
-def test_what_was_given_back_is_free(tmp_path: Path) -> None:
-    file = tmp_path / "AGI.lease"
-    with lease(file, "AGI"):
-        pass
-
-    with lease(file, "AGI"):
-        assert file.exists()
-
-
 def test_what_a_killed_process_held_is_free_at_once(tmp_path: Path) -> None:
     file = tmp_path / "AGI.lease"
     holder = subprocess.Popen(

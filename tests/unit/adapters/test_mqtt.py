@@ -333,18 +333,3 @@ async def test_a_release_and_a_resume_are_published_once_at_qos_0_and_not_kept()
         {"release": {"ids": ["01A", "boot-1"], "ch": "c", "attempt": "01T"}},
         {"resume": {"ch": "d", "attempt": "01U"}},
     ]
-
-
-async def test_a_release_without_a_broker_fails_and_is_kept_for_nobody() -> None:
-    (port,) = free_ports(1)
-    heard = Heard(port, "/iveg/AGI/cmd")
-    transport = MqttTransport(heard.link, "iveg")
-    async with running(heard.link):
-        with pytest.raises(HopError):
-            await transport.release("AGI", ["01A"], "c", "01T")
-        async with mqtt_broker("127.0.0.1", port):
-            await until(lambda: heard.link.connected)
-            await heard.link.publish("/iveg/AGI/cmd", b"last")
-            await until(lambda: heard.messages)
-
-    assert [payload for _, payload in heard.messages] == [b"last"]

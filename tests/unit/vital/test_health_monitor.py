@@ -158,15 +158,6 @@ def test_an_agent_that_keeps_up_and_answers_no_question_is_down() -> None:
     assert (silent.state, silent.detail) == ("down", monitor.agent_silent)
 
 
-def test_a_probe_of_an_earlier_life_proves_nothing() -> None:
-    monitor = HealthMonitor(START, lambda: "unknown")
-    monitor.sent(Origin("new", 1), START)
-    monitor.stored(Origin("old", 1))
-    monitor.received(Origin("old", 1), START)
-
-    assert (monitor.stored_at, monitor.probe.is_known) == (None, False)
-
-
 @pytest.mark.parametrize("hop_name", ["orion", "iot_agent"])
 def test_f7_a_neighbour_that_answers_slowly_is_late(hop_name: str) -> None:
     monitor = healthy(10.0)
