@@ -57,8 +57,6 @@ class Ingest:
         self._queue: deque[Received] = deque()
         self._refused: dict[str, Received] = {}
         """By robot, that one of its detection frames was dropped."""
-        self._identities: set[_Identity] = set()
-        """Of what waits and was counted by its sender."""
         self._waiting: Counter[_Stream] = Counter()
         """How much waits, by robot and kind."""
         self._due: dict[_Stream, float] = {}
@@ -99,8 +97,6 @@ class Ingest:
         if self._waiting[stream] >= MOST_WAITING:
             self._drop_oldest(stream)
         self._queue.append(received)
-        if not received.asked:
-            self._identities.add(_identity(received.observation))
         self._waiting[stream] += 1
         self._wake.set()
 
@@ -110,19 +106,15 @@ class Ingest:
         An agent that starts is given what the broker kept, and tells nobody so: one
         message is a claim, and two that count on are a link.  Boxes slow at once.
         """
-        identity = _identity(received.observation)
-        is_alone = identity[1] in _LINKED and self._is_alone(*identity)
+        observation = received.observation
+        is_alone = kind_of(observation) in _LINKED and self._is_alone(observation)
         self.enqueue(replace(received, alone=True) if is_alone else received)
 
-    def _is_alone(
-        self,
-        robot_id: str,
-        kind: type[Observation],
-        boot: str | None,
-        seq: int | None,
-    ) -> bool:
+    def _is_alone(self, observation: Observation) -> bool:
         """Whether it is the first of its boot, or that again."""
-        stream = robot_id, kind, None if seq is None else boot
+        seq = observation.origin.seq
+        boot = None if seq is None else observation.origin.boot
+        stream = observation.robot_id, kind_of(observation), boot
         first = self._first.get(stream)
         if first is None:
             if len(self._first) >= _MOST_BOOTS:
@@ -141,15 +133,13 @@ class Ingest:
         seq: int,
         now: float = math.inf,
     ) -> bool:
-        """Whether a message cannot be news: it is here, or a later one was taken.
+        """Whether a message cannot be news: it or a later one was taken.
 
         Nor is it what comes too soon after a direct one of a kind that is only drawn
         (``now`` monotonic, s).
         """
-        return (
-            (robot_id, kind, boot, seq) in self._identities
-            or now < self._due.get((robot_id, kind), 0.0)
-            or self._world.is_past(robot_id, kind, boot, seq)
+        return now < self._due.get((robot_id, kind), 0.0) or self._world.is_past(
+            robot_id, kind, boot, seq
         )
 
     def is_early(self, robot_id: str, kind: type[Observation], now: float) -> bool:
@@ -183,45 +173,31 @@ class Ingest:
 
     def drain(self) -> Iterable[Received]:
         """Everything that waits, oldest first."""
-        while self._queue:
-            received = self._queue.popleft()
-            self._forget(received)
-            yield received
+        waiting, self._queue = self._queue, deque()
         refused, self._refused = self._refused, {}
-        yield from refused.values()
+        self._waiting.clear()
+        return *waiting, *refused.values()
 
     async def wait(self, timeout_s: float) -> None:
         """Return when something waits, or after a while."""
         await wait_set(self._wake, timeout_s)
 
     def _drop_oldest(self, stream: "_Stream") -> None:
-        index = next(
-            index for index, one in enumerate(self._queue) if _stream(one) == stream
+        index, dropped = next(
+            (index, one)
+            for index, one in enumerate(self._queue)
+            if _stream(one) == stream
         )
-        dropped = self._queue[index]
         del self._queue[index]
-        self._forget(dropped)
+        self._waiting[stream] -= 1
         robot_id, kind = stream
         self.counters[f"dropped.{kind.__name__}"] += 1
         if kind is DetectionFrame:
-            self._refused[robot_id] = replace(
-                dropped, observation=RefusedFrame(robot_id)
-            )
-
-    def _forget(self, received: Received) -> None:
-        stream = _stream(received)
-        self._identities.discard(_identity(received.observation))
-        self._waiting[stream] -= 1
+            refused = replace(dropped, observation=RefusedFrame(robot_id))
+            self._refused[robot_id] = refused
 
 
 _Stream = tuple[str, type[Observation]]
-_Identity = tuple[str, type[Observation], str | None, int | None]
-
-
-def _identity(observation: Observation) -> _Identity:
-    """Identity of a message, where its sender counts."""
-    origin = observation.origin
-    return observation.robot_id, kind_of(observation), origin.boot, origin.seq
 
 
 def _is_twin_of_a_picture(observation: Observation) -> bool:

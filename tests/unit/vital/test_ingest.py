@@ -120,28 +120,6 @@ def test_what_was_asked_for_is_counted_apart_from_what_was_sent() -> None:
     assert queue.counters == counted
 
 
-def test_a_message_that_waits_is_known_and_one_that_has_left_is_the_worlds() -> None:
-    queue = ingest()
-    queue.enqueue(received(detection_frame(origin=origin(7))))
-    waiting = queue.is_past("AGI", DetectionFrame, "boot-a", 7)
-    others = [
-        queue.is_past("AGI", DetectionFrame, "boot-a", 6),
-        queue.is_past("AGI", Odometry, "boot-a", 7),
-        queue.is_past("AGII", DetectionFrame, "boot-a", 7),
-    ]
-    list(queue.drain())
-
-    assert (waiting, others) == (True, [False] * 3)
-    assert not queue.is_past("AGI", DetectionFrame, "boot-a", 7)
-
-
-def test_what_orion_was_asked_for_hides_no_message() -> None:
-    queue = ingest()
-    queue.enqueue(replace(received(odometry(origin=origin(7))), asked=True))
-
-    assert not queue.is_past("AGI", Odometry, "boot-a", 7)
-
-
 def test_the_twin_of_a_picture_is_timed_and_counted_and_waits_for_nobody() -> None:
     timed: list[Received] = []
     queue = Ingest(World(("AGI",)), timed.append, ignore)
