@@ -249,8 +249,8 @@ MUTANTS = (
     ),
     Mutant(
         "clear: a frame that a full queue drops is as if it never came",
-        "if kind is DetectionFrame:\n            self._refused[robot_id] = replace(",
-        "if False:\n            self._refused[robot_id] = replace(",
+        "if kind is DetectionFrame:\n            refused = replace(",
+        "if False:\n            refused = replace(",
         ("unit/vital/test_ingest.py",),
     ),
     Mutant(

@@ -158,26 +158,16 @@ class FileJournal:
         hold_id: str | None,
         by: str,
         at: Instant,
+        *,
+        named: Sequence[str] = (),
+        challenge: str | None = None,
     ) -> None:
         """Append one line; returns when it is on disk.
 
-        A disk that fails is logged and does not hold up the STOP.
+        ``named``: STOPs that a release is about to name.  A disk that fails is logged
+        and does not hold up the STOP.
         """
-        self._waiting.append(_Wish(robot_id, desired, by, at.wall, hold_id, ()))
-        await self.flushed()
-
-    async def log_release(
-        self,
-        robot_id: str,
-        hold_id: str,
-        ids: Sequence[str],
-        challenge: str,
-        by: str,
-        at: Instant,
-    ) -> None:
-        """Append the STOPs that a release is about to name; likewise."""
-        named = tuple(ids)
-        wish = _Wish(robot_id, "stopped", by, at.wall, hold_id, named, challenge)
+        wish = _Wish(robot_id, desired, by, at.wall, hold_id, tuple(named), challenge)
         self._waiting.append(wish)
         await self.flushed()
 

@@ -108,19 +108,11 @@ class VirtualPipeline:
         hold_id: str | None,
         by: str,
         at: Instant,
+        *,
+        named: Sequence[str] = (),
+        challenge: str | None = None,
     ) -> None:
         """Ignore; no robot is stopped here."""
-
-    async def log_release(
-        self,
-        robot_id: str,
-        hold_id: str,
-        ids: Sequence[str],
-        challenge: str,
-        by: str,
-        at: Instant,
-    ) -> None:
-        """Ignore; no robot is released here."""
 
 
 def read_direct(topic: str, payload: bytes, now: Instant) -> Iterator[Received]:

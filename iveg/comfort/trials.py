@@ -23,7 +23,7 @@ from iveg.vital.operators import Rules
 
 PART: Final = "shadow-rule"
 _SETTLES_S: Final = 2.0
-"""Until then it may still miss what those in force remember of earlier scans."""
+"""Until then it may still miss what those in force remember of earlier looks."""
 
 
 class ShadowRun:

@@ -173,7 +173,7 @@ class Decisions:
     @property
     def open(self) -> list[SlowdownDecision]:
         """All open decisions."""
-        return [one for one in self._all.values() if one.ended is None]
+        return [decision for decision in self._all.values() if decision.ended is None]
 
     def begin(
         self, entry: ZoneEntry, rule: DetectionRule, places: Iterable[Place] = ()
@@ -182,50 +182,64 @@ class Decisions:
         decision = SlowdownDecision(entry, rule, places=tuple(places))
         self._all[decision.decision_id] = decision
         if len(self._all) > self._keep:
-            ended = (key for key, one in self._all.items() if one.ended is not None)
+            ended = (
+                key for key, decision in self._all.items() if decision.ended is not None
+            )
             self._all.pop(next(ended, ""), None)
         return decision
 
     def end(self, decision_id: str, at: Instant) -> list[SlowdownDecision]:
         """A robot was let go."""
-        one = self._all.get(decision_id)
-        return [] if one is None else self._change([one], lambda one: one.closed(at))
+        decision = self._all.get(decision_id)
+        return (
+            []
+            if decision is None
+            else self._change([decision], lambda decision: decision.closed(at))
+        )
 
     def moved(
         self, robot_id: str, speed: float, at: Instant, *, is_slow: bool
     ) -> list[SlowdownDecision]:
         """A robot drives, at this measured speed (m/s)."""
         some = self._open_of(robot_id) if is_slow else ()
-        return self._change(some, lambda one: one.slowed(speed, at))
+        return self._change(some, lambda decision: decision.slowed(speed, at))
 
     def reported(self, report: SafetyReport, at: Instant) -> list[SlowdownDecision]:
         """A robot says what it applies."""
         some = self._open_of(report.robot_id)
-        return self._change(some, lambda one: one.reported(report, at))
+        return self._change(some, lambda decision: decision.reported(report, at))
 
     def published(self, at: Instant) -> list[SlowdownDecision]:
         """Feedback was published."""
-        return self._change(self.open, lambda one: one.published(at))
+        return self._change(self.open, lambda decision: decision.published(at))
 
     def age(self, heard_s: Callable[[ZoneEntry], float]) -> list[SlowdownDecision]:
         """Time passes.
 
         ``heard_s``: how long an entry's robot has been heard since it began (s).
         """
-        return self._change(self.open, lambda one: one.aged(heard_s(one.entry)))
+        return self._change(
+            self.open, lambda decision: decision.aged(heard_s(decision.entry))
+        )
 
     def break_off(self, at: Instant) -> list[SlowdownDecision]:
         """End every open one: iVeg stops."""
-        return self._change(self.open, lambda one: one.closed(at, interrupted=True))
+        return self._change(
+            self.open, lambda decision: decision.closed(at, interrupted=True)
+        )
 
     def _open_of(self, robot_id: str) -> list[SlowdownDecision]:
-        return [one for one in self.open if one.entry.robot_id == robot_id]
+        return [
+            decision for decision in self.open if decision.entry.robot_id == robot_id
+        ]
 
     def _change(
         self,
         some: Iterable[SlowdownDecision],
         step: Callable[[SlowdownDecision], SlowdownDecision],
     ) -> list[SlowdownDecision]:
-        changed = [after for one in some if (after := step(one)) is not one]
-        self._all.update({one.decision_id: one for one in changed})
+        changed = [
+            after for decision in some if (after := step(decision)) is not decision
+        ]
+        self._all.update({decision.decision_id: decision for decision in changed})
         return changed

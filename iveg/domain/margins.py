@@ -6,7 +6,7 @@ and a constant deceleration (docs/safety.md, "Margins")::
     S_p = v_h (T + v/a)  +  v T    +  v²/2a   +  Z
           person walks     reaction   braking    uncertainty
 
-It is shown beside the paper's ring and decides nothing.  T grows with the age of the
+It is shown beside the paper's zone and decides nothing.  T grows with the age of the
 data: a distance is as old as the older of both positions.  Somebody out of sight may
 have come nearer: of whom that could matter the margin is unknown, and of everybody else
 it is at least what is shown.  Left out: the intrusion distance C, since nobody reaches

@@ -95,7 +95,7 @@ class Near:
     Attributes:
         about: Its id, where it is known.
         distance_m: To it (m); ``lane`` is where it is.
-        foretold_s: Until the robot reaches its ring (s); None: it is inside.
+        foretold_s: Until the robot reaches its zone (s); None: it is inside.
         unseen_s: Since anybody saw it (s); of a robot of the fleet 0.
     """
 

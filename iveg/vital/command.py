@@ -182,13 +182,14 @@ class OrderSender:
         if machine.hold_id is None or not effect.ours:
             return
         by = "iveg" if machine.stop is None else machine.stop.requesters[0]
-        await self._journal.log_release(
+        await self._journal.log_desired(
             machine.robot_id,
+            "stopped",
             machine.hold_id,
-            effect.ours,
-            effect.attempt.challenge,
             by,
             self._clock(),
+            named=effect.ours,
+            challenge=effect.attempt.challenge,
         )
 
     async def _attempt(

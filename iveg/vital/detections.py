@@ -119,7 +119,6 @@ class DetectionTracking:
         if verdict != "new" and not protects:
             return
         if not detector.admits_frame(received.at):
-            self._world.counters["pictures.not_judged"] += 1
             detector.note_flaw("overload", received.at)
             return
         frame = name_numbers(frame, robot.description.classes)
@@ -128,10 +127,6 @@ class DetectionTracking:
         words = self._hear_words(frame, name, rule)
         placed = self._look(frame, received, rule, seen_at)
         turned_away, unplaced = self._people.turned_away, self._people.unplaced
-        if turned_away:
-            self._world.counters["people.turned_away"] += turned_away
-        if unplaced:
-            self._world.counters["people.unplaced"] += unplaced
         flaw = flaw_of(frame, rule, turned_away, unplaced, has_pose=has_pose)
         if flaw is None and words.is_strange:
             flaw = "strange"

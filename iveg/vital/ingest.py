@@ -101,19 +101,15 @@ class Ingest:
         An agent that starts is given what the broker kept, and tells nobody so: one
         message is a claim, and two that count on are a link.  Boxes slow at once.
         """
-        identity = _identity(received.observation)
-        is_alone = identity[1] in _LINKED and self._is_alone(*identity)
+        observation = received.observation
+        is_alone = kind_of(observation) in _LINKED and self._is_alone(observation)
         self.enqueue(replace(received, alone=True) if is_alone else received)
 
-    def _is_alone(
-        self,
-        robot_id: str,
-        kind: type[Observation],
-        boot: str | None,
-        seq: int | None,
-    ) -> bool:
+    def _is_alone(self, observation: Observation) -> bool:
         """Whether it is the first of its boot, or that again."""
-        stream = robot_id, kind, None if seq is None else boot
+        seq = observation.origin.seq
+        boot = None if seq is None else observation.origin.boot
+        stream = observation.robot_id, kind_of(observation), boot
         first = self._first.get(stream)
         if first is None:
             if len(self._first) >= _MOST_BOOTS:
@@ -155,44 +151,31 @@ class Ingest:
 
     def drain(self) -> Iterable[Received]:
         """Everything that waits, oldest first."""
-        while self._queue:
-            received = self._queue.popleft()
-            self._forget(received)
-            yield received
+        waiting, self._queue = self._queue, deque()
         refused, self._refused = self._refused, {}
-        yield from refused.values()
+        self._waiting.clear()
+        return *waiting, *refused.values()
 
     async def wait(self, timeout_s: float) -> None:
         """Return when something waits, or after a while."""
         await wait_set(self._wake, timeout_s)
 
     def _drop_oldest(self, stream: "_Stream") -> None:
-        index = next(
-            index for index, one in enumerate(self._queue) if _stream(one) == stream
+        index, dropped = next(
+            (index, one)
+            for index, one in enumerate(self._queue)
+            if _stream(one) == stream
         )
-        dropped = self._queue[index]
         del self._queue[index]
-        self._forget(dropped)
+        self._waiting[stream] -= 1
         robot_id, kind = stream
         self.counters[f"dropped.{kind.__name__}"] += 1
         if kind is DetectionFrame:
-            self._refused[robot_id] = replace(
-                dropped, observation=RefusedFrame(robot_id)
-            )
-
-    def _forget(self, received: Received) -> None:
-        stream = _stream(received)
-        self._waiting[stream] -= 1
+            refused = replace(dropped, observation=RefusedFrame(robot_id))
+            self._refused[robot_id] = refused
 
 
 _Stream = tuple[str, type[Observation]]
-_Identity = tuple[str, type[Observation], str | None, int | None]
-
-
-def _identity(observation: Observation) -> _Identity:
-    """Identity of a message, where its sender counts."""
-    origin = observation.origin
-    return observation.robot_id, kind_of(observation), origin.boot, origin.seq
 
 
 def _stream(received: Received) -> _Stream:

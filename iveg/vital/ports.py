@@ -84,21 +84,14 @@ class StopJournal(Protocol):
         hold_id: str | None,
         by: str,
         at: Instant,
+        *,
+        named: Sequence[str] = (),
+        challenge: str | None = None,
     ) -> None:
-        """Write a robot's desired state down; returns when it is on disk."""
+        """Write a robot's desired state down; returns when it is on disk.
 
-    async def log_release(
-        self,
-        robot_id: str,
-        hold_id: str,
-        ids: Sequence[str],
-        challenge: str,
-        by: str,
-        at: Instant,
-    ) -> None:
-        """Write down that a release is about to name these STOPs; likewise.
-
-        The robot is still to stand: only a desired state of ``run`` ends that.
+        ``named``: STOPs that a release is about to name, with its ``challenge``.  The
+        robot is still to stand: only a desired state of ``run`` ends that.
         """
 
 

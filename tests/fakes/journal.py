@@ -18,7 +18,7 @@ class FakeJournal:
 
     def __init__(self) -> None:
         self.lines: list[tuple[str, str, str | None, str]] = []
-        self.named_lines: list[tuple[str, str, tuple[str, ...], str]] = []
+        self.named_lines: list[tuple[str, str | None, tuple[str, ...], str]] = []
         self.opened = asyncio.Event()
         self.opened.set()
 
@@ -29,18 +29,12 @@ class FakeJournal:
         hold_id: str | None,
         by: str,
         at: Instant,  # noqa: ARG002 - the port
+        *,
+        named: Sequence[str] = (),
+        challenge: str | None = None,
     ) -> None:
         await self.opened.wait()
-        self.lines.append((robot_id, desired, hold_id, by))
-
-    async def log_release(
-        self,
-        robot_id: str,
-        hold_id: str,
-        ids: Sequence[str],
-        challenge: str,
-        by: str,  # noqa: ARG002 - the port
-        at: Instant,  # noqa: ARG002 - the port
-    ) -> None:
-        await self.opened.wait()
-        self.named_lines.append((robot_id, hold_id, tuple(ids), challenge))
+        if challenge is None:
+            self.lines.append((robot_id, desired, hold_id, by))
+        else:
+            self.named_lines.append((robot_id, hold_id, tuple(named), challenge))

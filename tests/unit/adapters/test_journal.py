@@ -53,8 +53,12 @@ async def test_the_same_wish_again_adds_no_line_and_another_does(
 ) -> None:
     path = tmp_path / "commands.jsonl"
     journal = await write(path, *[("AGI", "stopped")] * 100)
-    await journal.log_release("AGI", "01A", ["01A"], "c1", "ana", START)
-    await journal.log_release("AGI", "01A", ["01A"], "c1", "ben", START)
+    await journal.log_desired(
+        "AGI", "stopped", "01A", "ana", START, named=["01A"], challenge="c1"
+    )
+    await journal.log_desired(
+        "AGI", "stopped", "01A", "ben", START, named=["01A"], challenge="c1"
+    )
     await journal.log_desired("AGI", "run", None, "ana", START)
     await journal.log_desired("AGII", "run", None, "ana", START)
     await journal.log_desired("AGI", "stopped", "01A", "ana", START)
@@ -91,7 +95,9 @@ async def test_what_a_release_has_named_is_known_and_still_wanted(
 ) -> None:
     path = tmp_path / "commands.jsonl"
     journal = await write(path, ("AGI", "stopped"))
-    await journal.log_release("AGI", "01A", ["01A", "01B"], "c1", "ana", START)
+    await journal.log_desired(
+        "AGI", "stopped", "01A", "ana", START, named=["01A", "01B"], challenge="c1"
+    )
     await journal.log_desired("AGI", "stopped", "01C", "iveg", START)
     journal.close()
 
@@ -171,7 +177,15 @@ async def _live_long(journal: FileJournal, rnd: Random) -> None:
         ids = [f"n{rnd.randrange(number + 1)}" for _ in range(rnd.randrange(1, 4))]
         if what == "named":
             names = list(dict.fromkeys(ids))
-            await journal.log_release(robot, ids[0], names, f"c{number}", "ana", START)
+            await journal.log_desired(
+                robot,
+                "stopped",
+                ids[0],
+                "ana",
+                START,
+                named=names,
+                challenge=f"c{number}",
+            )
         else:
             hold = None if what == "run" else ids[0]
             desired: Literal["stopped", "run"] = "run" if hold is None else "stopped"

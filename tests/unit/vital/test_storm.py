@@ -61,7 +61,7 @@ def test_who_must_slow_down_is_told_at_once_and_the_rest_ten_times_a_second() ->
     assert sum(told) <= 13
 
 
-async def test_a_storm_slows_who_is_near_raises_one_alert_and_is_counted() -> None:
+async def test_a_storm_slows_who_is_near_and_raises_one_alert() -> None:
     desk = stormed()
     await desk.wait(0.05)
     assert [one.speed_factor for one in desk.evaluator.speed_limits.values()] == [
@@ -70,7 +70,6 @@ async def test_a_storm_slows_who_is_near_raises_one_alert_and_is_counted() -> No
     ]
     assert desk.evaluator.speed_limits["AGII"].cause == "AGI"
     assert list(conditions_of(desk)).count(ALERT) == 1
-    assert desk.world.counters["pictures.not_judged"] >= 40
 
 
 async def test_it_is_over_a_second_after_the_last_that_was_not_judged() -> None:
@@ -101,6 +100,5 @@ async def test_nobody_who_is_known_is_dropped_and_robots_can_read_what_they_hear
     await desk.wait(0.1)
     known = desk.evaluator.people.known
     assert next(iter(known)) == "P1"
-    assert desk.world.counters["people.turned_away"] > 0
     assert len(desk.fleet.told[-1].alerts) <= MOST_ALERTS
     assert ALERT in conditions_of(desk)
