@@ -7,14 +7,12 @@ are laid over the grid with their zone at the moment of the request.
 
 A ``Grid`` says where the cells lie, a ``Sweep`` what one scan says of those in its
 reach: a cell is free if the beam in that direction went further, taken if it ended
-there.  Left out: beams are lines without width, and come from the nearest quarter of a
-cell.
+there.  Left out: beams are lines without width.
 """
 
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,8 +122,6 @@ def _stretch(low: float, high: float) -> tuple[float, float]:
 
 
 _HIT, _MISS = 0.85, -0.4
-_PARTS = 4
-"""Places of a sensor in a cell along each axis, each worked out once."""
 _REACH_M = 15.0
 
 
@@ -153,52 +149,19 @@ def sweep_of(
     """
     sensor = pose.compose(scan.mount)
     reach = min(scan.range_max, _REACH_M)
-    row, column = grid.index(sensor.x, sensor.y)
-    around = math.ceil(reach / grid.resolution)
-    first_row, first_column = row - around, column - around
-    rows = overlap(first_row, 2 * around + 1, grid.height)
-    columns = overlap(first_column, 2 * around + 1, grid.width)
-    shape = rows.stop - rows.start, columns.stop - columns.start
-    change = np.zeros(shape, np.float32)
-    if change.size and scan.ranges.size:
-        distance, bearing = _seen_from(grid, sensor, around)
-        part = (
-            slice(rows.start - first_row, rows.stop - first_row),
-            slice(columns.start - first_column, columns.stop - first_column),
-        )
-        free_to = _free_to(scan, sensor.yaw, bearing[part], reach)
-        free = distance[part] < free_to - np.float32(grid.resolution)
-        np.multiply(free, np.float32(_MISS), out=change)
-        points = scan.points(pose) if returns is None else returns
-        hit = _hits(points, sensor, grid, reach) - (rows.start, columns.start)
-        hit = hit[((hit >= 0) & (hit < shape)).all(axis=1)]
-        change[hit[:, 0], hit[:, 1]] = _HIT
-    return Sweep((rows, columns), change)
-
-
-def _seen_from(grid: Grid, sensor: Pose2D, around: int) -> tuple[Numbers, Numbers]:
-    """Distances (m) and bearings (rad) of the cells around a sensor, about exactly."""
-    x = (sensor.x - grid.xmin) / grid.resolution
-    y = (sensor.y - grid.ymin) / grid.resolution
-    parts = (math.floor((place - math.floor(place)) * _PARTS) for place in (x, y))
-    return _cells_around(grid.resolution, around, *parts)
-
-
-@lru_cache(maxsize=_PARTS * _PARTS)
-def _cells_around(
-    resolution: float, around: int, part_x: int, part_y: int
-) -> tuple[Numbers, Numbers]:
-    """Where cells are, from a sensor in that part of the cell in the middle.
-
-    The angles of a hundred thousand cells cost more than all else in a sweep.
-    """
-    cells = np.arange(-around, around + 1, dtype=np.float32) + 0.5
-    dx = (cells - (part_x + 0.5) / _PARTS)[None, :] * resolution
-    dy = (cells - (part_y + 0.5) / _PARTS)[:, None] * resolution
-    return (
-        np.hypot(dx, dy).astype(np.float32),
-        np.arctan2(dy, dx).astype(np.float32),
-    )
+    cells = grid.window(sensor.x, sensor.y, reach)
+    dx, dy = grid.offsets(cells, sensor.x, sensor.y)
+    if not (dx.size and dy.size and scan.ranges.size):
+        return Sweep(cells, np.zeros((dy.size, dx.size), np.float32))
+    free_to = _free_to(scan, sensor.yaw, np.arctan2(dy, dx), reach)
+    free = np.hypot(dx, dy) < free_to - np.float32(grid.resolution)
+    change = np.where(free, np.float32(_MISS), np.float32(0.0))
+    points = scan.points(pose) if returns is None else returns
+    rows, columns = cells
+    hit = _hits(points, sensor, grid, reach) - (rows.start, columns.start)
+    hit = hit[((hit >= 0) & (hit < change.shape)).all(axis=1)]
+    change[hit[:, 0], hit[:, 1]] = _HIT
+    return Sweep(cells, change)
 
 
 def _free_to(scan: LaserScan, yaw: float, bearing: Numbers, reach: float) -> Numbers:

@@ -63,11 +63,6 @@ class Doubts:
             spell = _Spell(now.mono - lasted_s, now.mono)
         self._spells[code] = _Spell(spell.began, now.mono)
 
-    @property
-    def were_raised(self) -> bool:
-        """Whether anything was ever contradicted."""
-        return bool(self._spells)
-
     def active(self, now: Instant) -> tuple[str, ...]:
         """Codes of the doubts that count now, the oldest first."""
         if not self._spells:

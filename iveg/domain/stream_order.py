@@ -70,9 +70,8 @@ class StreamOrder:
     _old: dict[str, int] = field(default_factory=dict)
     _returning: tuple[str, float] | None = None
     """The old boot that speaks alone, and since when (monotonic, s)."""
-    _recent: deque[int] = field(default_factory=deque)
-    _known: set[int] = field(default_factory=set)
-    """The same, to look them up: what FIWARE brings is a copy nearly always."""
+    _known: dict[int, None] = field(default_factory=dict)
+    """The last counts in the order of arrival: FIWARE brings copies nearly always."""
 
     def knows_better_than(self, origin: Origin) -> bool:
         """Whether a record is of an earlier boot and must not be judged."""
@@ -125,12 +124,10 @@ class StreamOrder:
             del self._old[next(iter(self._old))]
         self.boot, self.seq, self._returning = boot, seq, None
         self._began, self._is_proven = arrived, is_proven
-        self._recent.clear()
         self._known.clear()
         self._remember(seq)
 
     def _remember(self, seq: int) -> None:
-        self._recent.append(seq)
-        self._known.add(seq)
-        if len(self._recent) > _REMEMBERED_SEQS:
-            self._known.discard(self._recent.popleft())
+        self._known[seq] = None
+        if len(self._known) > _REMEMBERED_SEQS:
+            del self._known[next(iter(self._known))]

@@ -129,16 +129,8 @@ class Account:
     def trial(self) -> Trial:
         """The trial with its account so far."""
         differences = (*self._ended, *self._open.values())
-        so_far = self._so_far
-        if so_far is not None:
-            so_far = replace(
-                so_far,
-                compared_s=round(so_far.compared_s, 3),
-                in_force=_rounded(so_far.in_force),
-                candidate=_rounded(so_far.candidate),
-            )
         kept = differences[-MOST_KEPT:]
-        return replace(self._trial, so_far=so_far, differences=kept)
+        return replace(self._trial, so_far=self._so_far, differences=kept)
 
 
 def _with(
@@ -151,11 +143,6 @@ def _with(
     encounters = Counter(done.encounters)
     encounters.update(one.entry.zone.reason for one in changes if one.began)
     return Doings(slowed_s, encounters)
-
-
-def _rounded(done: Doings) -> Doings:
-    seconds = {why: round(s, 3) for why, s in done.slowed_s.items()}
-    return Doings(seconds, dict(done.encounters))
 
 
 def _slows(limit: SpeedLimit) -> bool:

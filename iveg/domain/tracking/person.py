@@ -161,12 +161,6 @@ class TrackedPerson:
         """Middle of the places where they have been, in ``map`` (m)."""
         return self.extent.around.middle
 
-    @property
-    def is_possible(self) -> bool:
-        """Whether every zone is one of looks alone."""
-        zones = self.sightings
-        return bool(zones) and all(one.possible for one in zones)
-
     def stage(self, now: Instant) -> Stage:
         """The stage of life of the newest sighting."""
         age = self.age_s(now)

@@ -370,28 +370,31 @@ class Tracker:
     def _has_room(self, now: Instant, newest: Sighting) -> bool:
         """Whether one more can be kept, if need be in place of one without a zone.
 
-        Persons with a zone, and persons who were seen twice, stay.  A person who counts
-        by looks or a laser alone takes no place from one who counts by a box.
+        Persons with a zone stay, and so do those whom boxes showed twice.
         """
-        walkers = [one for one in self.known.values() if one.newest.laser]
-        if newest.laser:
-            mine = [one for one in walkers if one.newest.observer == newest.observer]
-            return len(mine) < MAX_WALKERS or self._makes_room(mine, now)
-        possible = sum(person.is_possible for person in self.known.values())
-        if newest.possible:
-            return possible < MAX_POSSIBLE
-        if len(self.known) - possible - len(walkers) < MAX_PEOPLE:
+        others = [one for one in self.known.values() if _shares_room(one, newest)]
+        if len(others) < _most_of(newest):
             return True
-        once = (one for one in self.known.values() if one.first_seen == one.newest.at)
-        return self._makes_room(once, now)
-
-    def _makes_room(self, people: Iterable[TrackedPerson], now: Instant) -> bool:
-        """Remove the first of them that has no zone; whether there was one."""
-        for person in people:
-            if person.stage(now) in ("last_seen", "gone"):
-                del self.known[person.person_id]
+        for one in others:
+            was_glimpsed = newest.laser or one.first_seen == one.newest.at
+            if was_glimpsed and one.stage(now) in ("last_seen", "gone"):
+                del self.known[one.person_id]
                 return True
         return False
+
+
+def _shares_room(person: TrackedPerson, newest: Sighting) -> bool:
+    """Whether both count by the same evidence; by lasers, by that of one robot."""
+    known = person.newest
+    is_of_robot = not known.laser or known.observer == newest.observer
+    return known.kind == newest.kind and is_of_robot
+
+
+def _most_of(newest: Sighting) -> int:
+    """Number of people who may count by the evidence of a sighting."""
+    if newest.laser:
+        return MAX_WALKERS
+    return MAX_POSSIBLE if newest.possible else MAX_PEOPLE
 
 
 def _without(picture: Sequence[PlacedDetection], found: Container[int]) -> list[int]:
