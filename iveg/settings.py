@@ -49,7 +49,6 @@ _QUIET: Final = ConfigDict(hide_input_in_errors=True)
 _SECRETS: Final = frozenset(
     {
         "IVEG_NOTIFY_TOKEN",
-        "IVEG_NOTIFY_TOKEN_PREVIOUS",
         "IVEG_API_TOKEN",
         "IVEG_SIGN_IN_TOKEN",
         "IVEG_MQTT_PASSWORD",
@@ -65,6 +64,7 @@ GONE: Final = frozenset(
         "IVEG_BROKER_ACCESS_COMMAND",
         "IVEG_DRILL_DAYS",
         "IVEG_FOXGLOVE",
+        "IVEG_NOTIFY_TOKEN_PREVIOUS",
         "IVEG_ORION_THROTTLE",
         "IVEG_RELEASE_PROOF_MINUTES",
         "IVEG_TRUTH",
@@ -127,12 +127,6 @@ class Settings:
         "IVEG_NOTIFY_TOKEN",
         "",
         "Secret that notifications must carry; empty: made at each start.",
-    )
-    notify_token_previous: Hex = setting(
-        "IVEG_NOTIFY_TOKEN_PREVIOUS",
-        "",
-        "The secret before, which notifications may carry while it is being changed; "
-        "empty: none.",
     )
     fiware_service: Service = setting(
         "IVEG_FIWARE_SERVICE", "agroconnect", "Tenant at Orion and the agent."

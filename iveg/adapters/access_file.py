@@ -25,6 +25,7 @@ from iveg.adapters.clock import new_id
 from iveg.adapters.files import Form, load_lines, put_aside, write_bytes, write_lines
 from iveg.domain.accounts import Access, AccessChange, Account, ApiToken, Session
 from iveg.domain.audit import CONSOLE
+from iveg.domain.errors import HopError
 from iveg.domain.records import Json
 
 _log = logging.getLogger(__name__)
@@ -182,11 +183,14 @@ class AccessFile:
         """Leave a change of the console for the server.
 
         Raises:
-            OSError: the disk did not take it.
+            HopError: the disk did not take it.
         """
         left = _LeftChange(change.action, change.row, change.details, change.gone)
         line = orjson.dumps(_with_checksum("change", left))
-        write_bytes(self.beside(f"{self._path.name}.left-{new_id()}"), line)
+        try:
+            write_bytes(self.beside(f"{self._path.name}.left-{new_id()}"), line)
+        except OSError as error:
+            raise HopError("disk", str(error)) from error
 
     def left(self) -> list[tuple[Path, AccessChange]]:
         """Changes of the console that wait, the oldest first."""

@@ -10,7 +10,6 @@ from iveg.adapters.history.queries import earlier_access, mark_moved
 from iveg.adapters.identity_provider import IdentityProvider
 from iveg.adapters.passwords import Passwords
 from iveg.domain.accounts import (
-    NOBODY,
     Access,
     AccessBook,
     AccessChange,
@@ -147,7 +146,7 @@ class Accounts:
             return
         found = await asyncio.to_thread(earlier_access, self._url)
         self._file.copied = True
-        self.book.add(found or NOBODY)
+        self.book.add(found or Access())
         await self._file.look()
         if found is not None and not self._file.failing:
             await asyncio.to_thread(mark_moved, self._url, self._clock().wall)

@@ -61,7 +61,6 @@ from iveg.web.live.pictures import Past, PictureRecorder
 from iveg.web.notifications import Followers, NotificationEndpoint
 from iveg.web.pages import sentences
 from iveg.web.pages.contexts import Site
-from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)
@@ -103,10 +102,7 @@ class Dss:
         by_link = settings.sign_in == "link" or demo
         link = settings.sign_in_token or secrets.token_hex(32)
         self.sign_in_token = link if by_link else ""
-        self.notify_secret = NotifySecret(
-            settings.notify_token or secrets.token_hex(32),
-            settings.notify_token_previous,
-        )
+        self.notify_secret = settings.notify_token or secrets.token_hex(32)
         boot = secrets.token_hex(8)
         self.pipeline = build(
             fleet,
@@ -207,7 +203,7 @@ class Dss:
                 settings.apikey,
                 context_broker_url=settings.iota_cb_url or settings.orion_url,
                 notify_url=settings.notify_address,
-                notify_token=self.notify_secret.current,
+                notify_token=self.notify_secret,
                 boot=self.core.boot,
                 tiles=self.pipeline.equipment.equipment.tiles,
                 scanned=self.fleet.ids if settings.direct_read == "all" else (),

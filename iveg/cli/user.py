@@ -3,7 +3,6 @@
 import argparse
 from collections.abc import Iterable
 from contextlib import suppress
-from functools import partial
 from typing import TypeVar
 
 from iveg.adapters import clock
@@ -15,9 +14,9 @@ from iveg.adapters.history.queries import earlier_access
 from iveg.app.outside import ACCOUNTS, files_of
 from iveg.cli.arguments import CommandCall
 from iveg.cli.running import page_address
-from iveg.domain.accounts import AccessBook, AccessChange, Account, ApiToken, name_key
+from iveg.domain.accounts import AccessBook, Account, ApiToken, name_key
 from iveg.domain.audit import CONSOLE
-from iveg.domain.errors import HopError, NameTakenError, UnknownNameError
+from iveg.domain.errors import NameTakenError, UnknownNameError
 from iveg.domain.retention import DAY_S
 from iveg.domain.stamps import format_stamp
 from iveg.settings import Settings
@@ -35,7 +34,7 @@ def run(call: CommandCall) -> int:
     url = history_url(settings.database_url, call.data)
     file = AccessFile(files_of(url, call.data) / ACCOUNTS)
     book = _known(file, url)
-    book.on_change.append(partial(_leave, file))
+    book.on_change.append(file.leave)
     try:
         print(_act(options, settings, book))
     finally:
@@ -54,13 +53,6 @@ def _known(file: AccessFile, url: str) -> AccessBook:
         with suppress(NameTakenError):
             book.apply(change)
     return book
-
-
-def _leave(file: AccessFile, change: AccessChange) -> None:
-    try:
-        file.leave(change)
-    except OSError as error:
-        raise HopError("disk", str(error)) from error
 
 
 def _act(options: argparse.Namespace, settings: Settings, book: AccessBook) -> str:

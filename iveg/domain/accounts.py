@@ -170,9 +170,6 @@ class Access:
     sessions: tuple[Session, ...] = ()
 
 
-NOBODY: Final = Access()
-
-
 MOST_SESSIONS: Final = 1000
 
 
@@ -200,7 +197,7 @@ class AccessBook:
         on_keep: Called when something is to be remembered; they return at once.
     """
 
-    def __init__(self, kept: Access = NOBODY) -> None:
+    def __init__(self, kept: Access = Access()) -> None:
         self.accounts = {one.account_id: one for one in kept.accounts}
         self.tokens = {one.digest: one for one in kept.tokens}
         self.sessions = {one.key: one for one in kept.sessions}
@@ -229,7 +226,7 @@ class AccessBook:
         self.keep()
 
     def apply(self, change: AccessChange) -> None:
-        """Have a change count, in every session, too.
+        """Have a change count, from the next request of each session on, too.
 
         Raises:
             NameTakenError: somebody or some program else is called so.
@@ -237,7 +234,7 @@ class AccessBook:
         row = change.row
         if isinstance(row, Account):
             _refuse_taken(row.name, row.account_id, self.accounts.values())
-            self._set(row)
+            self.accounts[row.account_id] = row
         else:
             _refuse_taken(row.name, row.token_id, self.tokens.values())
             self.tokens.pop(row.digest, None)
@@ -249,16 +246,8 @@ class AccessBook:
 
     def put(self, account: Account) -> None:
         """Keep a new state of an account, which is no change of rights."""
-        self._set(account)
-        self.keep()
-
-    def _set(self, account: Account) -> None:
-        """Keep an account, and forget the sessions that its new state has ended."""
         self.accounts[account.account_id] = account
-        for digest, one in [*self.sessions.items()]:
-            is_over = account.disabled or one.began < account.since
-            if one.person == account.account_id and is_over:
-                del self.sessions[digest]
+        self.keep()
 
     def open(self, session: Session) -> None:
         """Let a session begin; of too many the one that was idle longest ends."""

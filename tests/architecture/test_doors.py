@@ -4,7 +4,6 @@ import hashlib
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import httpx
 import pytest
@@ -117,18 +116,6 @@ def test_every_other_route_is_in_the_contract(app: FastAPI) -> None:
     others = {path for path, _ in _methods(app) if not path.startswith("/api/v1")}
 
     assert {path for path in others if f"{_written(path)}`" not in INTERFACES} == set()
-
-
-def test_the_settings_name_both_secrets_of_notifications(tmp_path: Path) -> None:
-    settings = Settings(notify_token="ab" * 16, notify_token_previous="cd" * 16)
-    secret = open_dss(settings, tmp_path).notify_secret
-
-    assert secret.current == "ab" * 16
-    assert [secret.admits(one * 16) for one in ("ab", "cd", "ef")] == [
-        True,
-        True,
-        False,
-    ]
 
 
 def _who(app: FastAPI, role: str) -> dict[str, str]:

@@ -127,7 +127,6 @@ GOOD = {
     "IVEG_IOTA_CB_URL": "http://orion.internal:1026",
     "IVEG_NOTIFY_URL": "http://iveg:8000/ngsi/notifications",
     "IVEG_NOTIFY_TOKEN": "ab" * 32,
-    "IVEG_NOTIFY_TOKEN_PREVIOUS": "ef" * 32,
     "IVEG_FIWARE_SERVICE": "farm_1",
     "IVEG_FIWARE_SERVICEPATH": "/a/b",
     "IVEG_FIWARE_TOKEN_URL": "http://keyrock:3005/oauth2/token",

@@ -27,7 +27,6 @@ from iveg.web.pages.drawing import Pages
 from iveg.web.security.authentication import Authenticator, Credentials
 from iveg.web.security.people import People
 from iveg.web.security.roles import Role
-from iveg.web.security.secrets import NotifySecret
 from iveg.web.views import Views
 from tests.fakes.accounts import FakeBook, FakePasswords
 from tests.fakes.recordings import FakeRecordings
@@ -75,7 +74,7 @@ class WebDesk(Desk):
         self.encoder = encoder.Encoder(self.views, self.hub, self.clock)
         self.notifications = notifications.NotificationEndpoint(
             self.ingest,
-            NotifySecret(SECRET),
+            SECRET,
             self.clock,
             self,
             ("agroconnect", "/greenhouse"),
