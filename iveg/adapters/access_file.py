@@ -136,7 +136,7 @@ class AccessFile:
 
     def _look_aside(self) -> None:
         found = self._path.parent.glob(f"{self._path.name}.damaged-*")
-        self.aside = sorted(one.name for one in found)
+        self.aside = sorted(path.name for path in found)
 
     def _write(self) -> None:
         # Before the newest is read: what is saved from here on queues the next writing.
@@ -241,9 +241,9 @@ def earlier_sessions(path: Path) -> tuple[Session, ...]:
 
 def _lines(access: Access, copied: bool) -> list[Json]:
     rows: list[tuple[str, object]] = [
-        *(("account", one) for one in access.accounts),
-        *(("token", one) for one in access.tokens),
-        *(("session", one) for one in access.sessions),
+        *(("account", row) for row in access.accounts),
+        *(("token", row) for row in access.tokens),
+        *(("session", row) for row in access.sessions),
     ]
     return [_with_checksum(*row) for row in (*rows, ("end", (len(rows), copied)))]
 

@@ -14,7 +14,7 @@ from iveg.domain.accounts import (
     AccessBook,
     AccessChange,
     ClaimReading,
-    name_key,
+    find_named,
 )
 from iveg.domain.audit import CONSOLE
 from iveg.domain.errors import HopError, NameTakenError
@@ -108,9 +108,9 @@ class Accounts:
         if self.people.is_led():
             return None
         admission = self.people.admission(CONSOLE)
-        for account in self.people.known.values():
-            if name_key(account.name) == FIRST_ADMIN:
-                return admission.reset(account, SET_UP_S)[0]
+        known = find_named(self.people.known.values(), FIRST_ADMIN)
+        if known is not None:
+            return admission.reset(known, SET_UP_S)[0]
         return admission.add(FIRST_ADMIN, "admin", waits_s=SET_UP_S)[0]
 
     # --- beside the requests ------------------------------------------------------
