@@ -25,6 +25,7 @@ from iveg.adapters.clock import new_id
 from iveg.adapters.files import Form, load_lines, put_aside, write_bytes, write_lines
 from iveg.domain.accounts import Access, AccessChange, Account, ApiToken, Session
 from iveg.domain.audit import CONSOLE
+from iveg.domain.errors import HopError
 from iveg.domain.records import Json
 
 _log = logging.getLogger(__name__)
@@ -135,7 +136,7 @@ class AccessFile:
 
     def _look_aside(self) -> None:
         found = self._path.parent.glob(f"{self._path.name}.damaged-*")
-        self.aside = sorted(one.name for one in found)
+        self.aside = sorted(path.name for path in found)
 
     def _write(self) -> None:
         # Before the newest is read: what is saved from here on queues the next writing.
@@ -182,11 +183,14 @@ class AccessFile:
         """Leave a change of the console for the server.
 
         Raises:
-            OSError: the disk did not take it.
+            HopError: the disk did not take it.
         """
         left = _LeftChange(change.action, change.row, change.details, change.gone)
         line = orjson.dumps(_with_checksum("change", left))
-        write_bytes(self.beside(f"{self._path.name}.left-{new_id()}"), line)
+        try:
+            write_bytes(self.beside(f"{self._path.name}.left-{new_id()}"), line)
+        except OSError as error:
+            raise HopError("disk", str(error)) from error
 
     def left(self) -> list[tuple[Path, AccessChange]]:
         """Changes of the console that wait, the oldest first."""
@@ -237,9 +241,9 @@ def earlier_sessions(path: Path) -> tuple[Session, ...]:
 
 def _lines(access: Access, copied: bool) -> list[Json]:
     rows: list[tuple[str, object]] = [
-        *(("account", one) for one in access.accounts),
-        *(("token", one) for one in access.tokens),
-        *(("session", one) for one in access.sessions),
+        *(("account", row) for row in access.accounts),
+        *(("token", row) for row in access.tokens),
+        *(("session", row) for row in access.sessions),
     ]
     return [_with_checksum(*row) for row in (*rows, ("end", (len(rows), copied)))]
 

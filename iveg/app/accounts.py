@@ -10,12 +10,11 @@ from iveg.adapters.history.queries import earlier_access, mark_moved
 from iveg.adapters.identity_provider import IdentityProvider
 from iveg.adapters.passwords import Passwords
 from iveg.domain.accounts import (
-    NOBODY,
     Access,
     AccessBook,
     AccessChange,
     ClaimReading,
-    name_key,
+    find_named,
 )
 from iveg.domain.audit import CONSOLE
 from iveg.domain.errors import HopError, NameTakenError
@@ -109,9 +108,9 @@ class Accounts:
         if self.people.is_led():
             return None
         admission = self.people.admission(CONSOLE)
-        for account in self.people.known.values():
-            if name_key(account.name) == FIRST_ADMIN:
-                return admission.reset(account, SET_UP_S)[0]
+        known = find_named(self.people.known.values(), FIRST_ADMIN)
+        if known is not None:
+            return admission.reset(known, SET_UP_S)[0]
         return admission.add(FIRST_ADMIN, "admin", waits_s=SET_UP_S)[0]
 
     # --- beside the requests ------------------------------------------------------
@@ -147,7 +146,7 @@ class Accounts:
             return
         found = await asyncio.to_thread(earlier_access, self._url)
         self._file.copied = True
-        self.book.add(found or NOBODY)
+        self.book.add(found or Access())
         await self._file.look()
         if found is not None and not self._file.failing:
             await asyncio.to_thread(mark_moved, self._url, self._clock().wall)

@@ -3,7 +3,6 @@
 import argparse
 from collections.abc import Iterable
 from contextlib import suppress
-from functools import partial
 from typing import TypeVar
 
 from iveg.adapters import clock
@@ -15,9 +14,9 @@ from iveg.adapters.history.queries import earlier_access
 from iveg.app.outside import ACCOUNTS, files_of
 from iveg.cli.arguments import CommandCall
 from iveg.cli.running import page_address
-from iveg.domain.accounts import AccessBook, AccessChange, Account, ApiToken, name_key
+from iveg.domain.accounts import AccessBook, Account, ApiToken, find_named, name_key
 from iveg.domain.audit import CONSOLE
-from iveg.domain.errors import HopError, NameTakenError, UnknownNameError
+from iveg.domain.errors import NameTakenError, UnknownNameError
 from iveg.domain.retention import DAY_S
 from iveg.domain.stamps import format_stamp
 from iveg.settings import Settings
@@ -35,7 +34,7 @@ def run(call: CommandCall) -> int:
     url = history_url(settings.database_url, call.data)
     file = AccessFile(files_of(url, call.data) / ACCOUNTS)
     book = _known(file, url)
-    book.on_change.append(partial(_leave, file))
+    book.on_change.append(file.leave)
     try:
         print(_act(options, settings, book))
     finally:
@@ -54,13 +53,6 @@ def _known(file: AccessFile, url: str) -> AccessBook:
         with suppress(NameTakenError):
             book.apply(change)
     return book
-
-
-def _leave(file: AccessFile, change: AccessChange) -> None:
-    try:
-        file.leave(change)
-    except OSError as error:
-        raise HopError("disk", str(error)) from error
 
 
 def _act(options: argparse.Namespace, settings: Settings, book: AccessBook) -> str:
@@ -101,11 +93,10 @@ def invitation_link(settings: Settings, invitation: str) -> str:
 
 
 def _find(known: Iterable[_Row], kind: str, name: str) -> _Row:
-    key = name_key(name)
-    for one in known:
-        if name_key(one.name) == key:
-            return one
-    raise UnknownNameError(kind, name)
+    found = find_named(known, name)
+    if found is None:
+        raise UnknownNameError(kind, name)
+    return found
 
 
 def _invited(settings: Settings, invitation: str) -> str:
@@ -117,15 +108,15 @@ def _invited(settings: Settings, invitation: str) -> str:
 
 def _lines(accounts: Iterable[Account]) -> Iterable[str]:
     now = clock.wall()
-    for one in sorted(accounts, key=lambda account: name_key(account.name)):
-        yield f"{one.name}  {one.role}  {_state(one, now)}"
+    for account in sorted(accounts, key=lambda account: name_key(account.name)):
+        yield f"{account.name}  {account.role}  {_state(account, now)}"
 
 
 def _programs(tokens: Iterable[ApiToken]) -> Iterable[str]:
-    for one in sorted(tokens, key=lambda token: name_key(token.name)):
-        used = "never used" if one.used_at is None else format_stamp(one.used_at)
-        ends = "" if one.ends_at is None else f", ends {format_stamp(one.ends_at)}"
-        yield f"{one.name}  program  {one.scope}  {used}{ends}"
+    for token in sorted(tokens, key=lambda token: name_key(token.name)):
+        used = "never used" if token.used_at is None else format_stamp(token.used_at)
+        ends = "" if token.ends_at is None else f", ends {format_stamp(token.ends_at)}"
+        yield f"{token.name}  program  {token.scope}  {used}{ends}"
 
 
 def _state(account: Account, now: float) -> str:

@@ -11,7 +11,7 @@ import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Final, Literal
+from typing import Final, Literal, TypeVar
 
 from iveg.domain.audit import Actor
 from iveg.domain.errors import NameTakenError, SignOnError
@@ -44,7 +44,7 @@ def is_name(text: str) -> bool:
         0 < len(text) <= MOST_NAME
         and text == unicodedata.normalize("NFC", text).strip()
         and _REFUSED.isdisjoint(text)
-        and not any(unicodedata.category(one)[0] == "C" for one in text)
+        and not any(unicodedata.category(character)[0] == "C" for character in text)
     )
 
 
@@ -170,9 +170,6 @@ class Access:
     sessions: tuple[Session, ...] = ()
 
 
-NOBODY: Final = Access()
-
-
 MOST_SESSIONS: Final = 1000
 
 
@@ -200,10 +197,10 @@ class AccessBook:
         on_keep: Called when something is to be remembered; they return at once.
     """
 
-    def __init__(self, kept: Access = NOBODY) -> None:
-        self.accounts = {one.account_id: one for one in kept.accounts}
-        self.tokens = {one.digest: one for one in kept.tokens}
-        self.sessions = {one.key: one for one in kept.sessions}
+    def __init__(self, kept: Access = Access()) -> None:
+        self.accounts = {account.account_id: account for account in kept.accounts}
+        self.tokens = {token.digest: token for token in kept.tokens}
+        self.sessions = {session.key: session for session in kept.sessions}
         self.on_change: list[Callable[[AccessChange], None]] = []
         self.on_keep: list[Callable[[], None]] = []
 
@@ -229,17 +226,21 @@ class AccessBook:
         self.keep()
 
     def apply(self, change: AccessChange) -> None:
-        """Have a change count, in every session, too.
+        """Have a change count, from the next request of each session on, too.
 
         Raises:
             NameTakenError: somebody or some program else is called so.
         """
         row = change.row
         if isinstance(row, Account):
-            _refuse_taken(row.name, row.account_id, self.accounts.values())
-            self._set(row)
+            known = find_named(self.accounts.values(), row.name)
+            if known is not None and known.account_id != row.account_id:
+                raise NameTakenError(row.name)
+            self.accounts[row.account_id] = row
         else:
-            _refuse_taken(row.name, row.token_id, self.tokens.values())
+            taken = find_named(self.tokens.values(), row.name)
+            if taken is not None and taken.token_id != row.token_id:
+                raise NameTakenError(row.name)
             self.tokens.pop(row.digest, None)
             if not change.gone:
                 self.tokens[row.digest] = row
@@ -249,32 +250,25 @@ class AccessBook:
 
     def put(self, account: Account) -> None:
         """Keep a new state of an account, which is no change of rights."""
-        self._set(account)
-        self.keep()
-
-    def _set(self, account: Account) -> None:
-        """Keep an account, and forget the sessions that its new state has ended."""
         self.accounts[account.account_id] = account
-        for digest, one in [*self.sessions.items()]:
-            is_over = account.disabled or one.began < account.since
-            if one.person == account.account_id and is_over:
-                del self.sessions[digest]
+        self.keep()
 
     def open(self, session: Session) -> None:
         """Let a session begin; of too many the one that was idle longest ends."""
         known = self.sessions
         if len(known) >= MOST_SESSIONS:
-            del known[min(known, key=lambda one: known[one].seen)]
+            del known[min(known, key=lambda digest: known[digest].seen)]
         self.sessions[session.key] = session
         self.keep()
 
 
-def _refuse_taken(name: str, own: str, known: Iterable[Account | ApiToken]) -> None:
+_Row = TypeVar("_Row", Account, ApiToken)
+
+
+def find_named(known: Iterable[_Row], name: str) -> _Row | None:
+    """The person or program of this name, as people write it; None: nobody."""
     key = name_key(name)
-    for one in known:
-        other = one.token_id if isinstance(one, ApiToken) else one.account_id
-        if other != own and name_key(one.name) == key:
-            raise NameTakenError(name)
+    return next((row for row in known if name_key(row.name) == key), None)
 
 
 SignOnFailure = Literal[
@@ -341,7 +335,9 @@ def person_id(issuer: str, subject: str) -> str:
 def name_of(claim: str, person: str) -> str:
     """A name that somebody may have, close to what is told; else part of the id."""
     kept = unicodedata.normalize("NFC", claim[: 4 * MOST_NAME])
-    kept = "".join(one for one in kept if is_name(f"x{one}x")).strip()[:MOST_NAME]
+    kept = "".join(
+        character for character in kept if is_name(f"x{character}x")
+    ).strip()[:MOST_NAME]
     return kept if is_name(kept := kept.strip()) else person[:12]
 
 
@@ -365,10 +361,10 @@ def values_at(claims: Json, path: str) -> Iterator[str]:
 
 def _walk(value: object, path: tuple[str, ...]) -> Iterator[str]:
     if isinstance(value, list):
-        for one in value:
+        for part in value:
             # Of a list inside a list nothing is read: no provider has one.
-            if not isinstance(one, list):
-                yield from _walk(one, path)
+            if not isinstance(part, list):
+                yield from _walk(part, path)
     elif path and isinstance(value, dict):
         yield from _walk(value.get(path[0]), path[1:])
     elif not path and isinstance(value, str):

@@ -46,7 +46,11 @@ class BoundedHttp(HttpToolsProtocol):
         self.table[self] = None
         self._await_head()
         if len(self.table) > self.most:
-            idle = (one for one in self.table if one.is_idle and one is not self)
+            idle = (
+                connection
+                for connection in self.table
+                if connection.is_idle and connection is not self
+            )
             next(idle, next(iter(self.table))).give_way()
 
     def connection_lost(self, exc: Exception | None) -> None:

@@ -83,14 +83,14 @@ def _add(routes: APIRouter, path: str, action: Action, *, everybodys: bool) -> N
         standing = authenticator_of(request).sessions.standing()
         # The one of a program is nobody's, and has no session.
         own = None if who.session is None else who.person
-        return [one for one in standing if everybodys or one[0].person == own]
+        return [shown for shown in standing if everybodys or shown[0].person == own]
 
     @routes.get(path, response_model=Listing[OpenSession])
     async def listed(request: Request, who: visitor) -> Response:
         """Those that are not over; the newest sign of life first."""
         seen = seen_by(request, who)
-        seen.sort(key=lambda one: one[0].seen, reverse=True)
-        return Json(Listing(items=[_open_session(*one, who) for one in seen]))
+        seen.sort(key=lambda shown: shown[0].seen, reverse=True)
+        return Json(Listing(items=[_open_session(*shown, who) for shown in seen]))
 
     @routes.delete(f"{path}/{{session_id}}", response_model=OpenSession)
     async def end(request: Request, session_id: str, who: visitor) -> Response:
@@ -107,7 +107,7 @@ def _add(routes: APIRouter, path: str, action: Action, *, everybodys: bool) -> N
         """End all but the one that asks, STOP included."""
         refuse_walls(who)
         seen = seen_by(request, who)
-        others = [one.key for one, _ in seen if not _is_own(one, who)]
+        others = [session.key for session, _ in seen if not _is_own(session, who)]
         authenticator_of(request).sessions.end(*others)
         return Json(SessionsEnded(ended=len(others)))
 
@@ -250,10 +250,10 @@ def users_router(people: People) -> APIRouter:
         """Every account, by name."""
         now = people.clock().wall
         items = [
-            UserAccount.of(one, now, own=user_id == who.person)
-            for user_id, one in people.known.items()
+            UserAccount.of(account, now, own=account.account_id == who.person)
+            for account in people.known.values()
         ]
-        items.sort(key=lambda one: name_key(one.name))
+        items.sort(key=lambda user: name_key(user.name))
         return Json(Listing(items=items))
 
     @routes.post("", response_model=Invitation, status_code=201)
@@ -321,9 +321,11 @@ def tokens_router(people: People) -> APIRouter:
     )
     async def tokens() -> Response:
         """Every program, by name."""
-        known = sorted(people.book.tokens.values(), key=lambda one: name_key(one.name))
+        known = sorted(
+            people.book.tokens.values(), key=lambda token: name_key(token.name)
+        )
         now = people.clock().wall
-        return Json(Listing(items=[ProgramToken.of(one, now) for one in known]))
+        return Json(Listing(items=[ProgramToken.of(token, now) for token in known]))
 
     @routes.post("", response_model=NewToken, status_code=201)
     async def give(body: TokenBody, who: Admin) -> Response:
@@ -338,9 +340,9 @@ def tokens_router(people: People) -> APIRouter:
     @routes.delete("/{token_id}", status_code=204)
     async def revoke(token_id: str, who: Admin) -> None:
         """End a token at once, and the sockets of its program."""
-        for one in people.book.tokens.values():
-            if one.token_id == token_id:
-                return people.admission(who).revoke(one)
+        for token in people.book.tokens.values():
+            if token.token_id == token_id:
+                return people.admission(who).revoke(token)
         raise UnknownNameError("token", token_id)
 
     return routes

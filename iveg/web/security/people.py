@@ -12,7 +12,7 @@ from iveg.domain.accounts import (
     ApiToken,
     TokenScope,
     digest_of,
-    name_key,
+    find_named,
 )
 from iveg.domain.audit import Actor
 from iveg.vital.ports import Clock
@@ -49,8 +49,8 @@ class People:
         """Whether somebody can sign in as admin."""
         now = self.clock().wall
         return any(
-            one.role == "admin" and one.password and one.is_open(now)
-            for one in self.known.values()
+            account.role == "admin" and account.password and account.is_open(now)
+            for account in self.known.values()
         )
 
     def admission(self, by: Actor) -> Admission:
@@ -67,9 +67,7 @@ class People:
         Raises:
             BusyError: too many sign in at once.
         """
-        key = name_key(name)
-        known = self.known.values()
-        found = next((one for one in known if name_key(one.name) == key), None)
+        found = find_named(self.known.values(), name)
         fits = await self._passwords.fits(password, found.password if found else "")
         if not found or not fits:
             return None
@@ -98,10 +96,10 @@ class People:
 
     def _invited(self, digest: str) -> Account | None:
         now = self.clock().wall
-        for one in self.known.values():
-            is_waiting = one.invited_until > now and not one.disabled
-            if one.invitation == digest and is_waiting:
-                return one
+        for account in self.known.values():
+            is_waiting = account.invited_until > now and not account.disabled
+            if account.invitation == digest and is_waiting:
+                return account
         return None
 
     async def change_password(self, who: Actor, old: str, new: str) -> Account | None:
@@ -132,9 +130,9 @@ class People:
 
     def current_program(self, principal: Principal) -> Principal | None:
         """Program as of now; None where its token has ended."""
-        for one in self.book.tokens.values():
-            if one.token_id == principal.person and one.is_open(self.clock().wall):
-                return _principal(one)
+        for token in self.book.tokens.values():
+            if token.token_id == principal.person and token.is_open(self.clock().wall):
+                return _principal(token)
         return None
 
     def close(self) -> None:

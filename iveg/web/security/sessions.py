@@ -156,15 +156,12 @@ class Sessions:
         return role if is_theirs else None
 
     def _remember(self) -> None:
-        """Take in those of earlier runs that are not over."""
+        """Take in those of earlier runs."""
         now = self._clock().wall
         for digest, session in [*self._sessions.items()]:
             # A clock that was ahead must not have made a session that never ends.
             began, seen = min(session.began, now), min(session.seen, now)
-            known = replace(session, began=began, seen=seen)
-            self._sessions[digest] = known
-            if role_at(known, now) is None:
-                del self._sessions[digest]
+            self._sessions[digest] = replace(session, began=began, seen=seen)
 
     def _keep(self) -> None:
         self._kept_at = self._clock().wall

@@ -114,16 +114,13 @@ async def test_whoever_is_not_let_in_is_computed_as_often_and_by_the_same_path(
         statuses = [await enter(page, name=name, password="wrong-1") for _ in range(2)]
 
     assert statuses == [401, 401]
-    # The hash that stands for nobody's is made once, whoever comes first.
-    assert [work for work, _ in passwords.computed] == ["_hash", "_fits", "_fits"]
+    assert [work for work, _ in passwords.computed] == ["_fits", "_fits"]
 
 
 async def test_a_flood_of_sign_ins_waits_in_a_short_line_beside_the_loop(
     held: tuple[PeoplesDesk, HeldPasswords],
 ) -> None:
     desk, passwords = held
-    await passwords.fits("", "")
-    passwords.computed.clear()
     passwords.gate.clear()
 
     async def flood(number: int) -> int:
