@@ -48,7 +48,7 @@ class _Source:
 
 
 class Intake(Protocol):
-    """Takes what is read: the pipeline's, or one that draws for viewers."""
+    """Takes what is read."""
 
     def is_early(self, robot_id: str, kind: type[Observation], now: float) -> bool:
         """Whether a message comes too soon after one of its kind to be read."""
@@ -115,13 +115,6 @@ class DirectReader:
             stream = source.robot_id, source.kind if is_often else None
             found.setdefault(stream, {})[topic] = source.qos
         return [*found.values()]
-
-    def stream(self, topic: str) -> tuple[str, type[Observation]] | None:
-        """The robot and the one kind of what comes on a topic, if it is one."""
-        source = self._sources.get(topic)
-        if source is None or source.kind is None:
-            return None
-        return source.robot_id, source.kind
 
     def refuse_stored(self, topic: str, _: bytes) -> None:
         """Count a message that the broker had retained: nobody knows how old it is."""

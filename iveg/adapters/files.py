@@ -39,14 +39,14 @@ LESS_URGENT = 10
 _FIRST_TO_GO = "1000"
 
 
-def give_way(less_urgent: int = LESS_URGENT) -> None:
+def give_way() -> None:
     """Let this process run where others leave room.
 
     Its priority is so much lower (nice), and on Linux it is a batch: one that wakes
     takes no other's place on a processor (sched(7), ``SCHED_BATCH``).  Where memory
     runs out the kernel ends it, and not the server (proc_pid_oom_score_adj(5)).
     """
-    os.nice(less_urgent)
+    os.nice(LESS_URGENT)
     if hasattr(os, "SCHED_BATCH"):
         # Some containers allow no change; being late is all that is lost.
         with contextlib.suppress(OSError):
