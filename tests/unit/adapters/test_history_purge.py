@@ -1,9 +1,7 @@
 """What leaves the history when its time is over, and what never does."""
 
 import asyncio
-import contextlib
 from collections.abc import Iterator, Sequence
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -13,11 +11,10 @@ from iveg.adapters.history import lists, upkeep
 from iveg.adapters.history.engine import upgrade, writing_engine
 from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.recorder import Recorder, Store
-from iveg.adapters.history.series import SPEEDS, people_seen, series_of
+from iveg.adapters.history.recorder import Store
+from iveg.adapters.history.series import people_seen
 from iveg.adapters.history.tables import TABLE_MAPPINGS
 from iveg.adapters.history.upkeep import purge_piece, recorded_days
-from iveg.adapters.journal import FileJournal
 from iveg.domain.records import ReadingRecord, Record
 from iveg.domain.retention import DAY_S, PURGE_STEPS, PurgeStep
 from iveg.vital.record import Waiting
@@ -210,37 +207,6 @@ def test_a_piece_takes_the_oldest_and_whole_moments(
     took = [run(engine, PurgeStep("telemetry", "odometry"), NOON) for _ in range(3)]
 
     assert took == [4, 2, 0]
-
-
-async def test_a_purge_beside_recording_loses_no_row(
-    database_url: str,
-    tmp_path: Path,
-    queries: Queries,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(upkeep, "PIECE", 50)
-    write(database_url, [odometry_record(at=OLD + n / 10) for n in range(1000)])
-    recorder = Recorder(database_url, FileJournal(tmp_path / "journal"))
-    writing = asyncio.create_task(recorder.run())
-    piece = partial(purge_piece, step=PurgeStep("telemetry", "odometry"), before=NOON)
-    taken, recorded = 0, 0
-
-    while True:
-        for _ in range(20):
-            recorder.enqueue(odometry_record(at=NOON + recorded))
-            recorded += 1
-        rows = await recorder.between_batches(piece)
-        taken += rows
-        if not rows:
-            break
-
-    writing.cancel()
-    with contextlib.suppress(asyncio.CancelledError):
-        await writing
-    await recorder.close()
-    found = await queries.ask(series_of, SPEEDS, NOON, NOON + 0.5 * SPEEDS.most)
-    assert (taken, recorder.counters["history_written"]) == (1000, recorded)
-    assert [*found["AGI",].at] == [NOON + n for n in range(recorded)]
 
 
 def test_days_of_the_log_are_found_newest_first(

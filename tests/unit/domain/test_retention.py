@@ -37,10 +37,6 @@ def test_a_clock_that_is_years_ahead_takes_three_days_and_no_more(years: int) ->
     assert cutoff(365, ahead * DAY_S + 1.0, recorded) == (TODAY - 361) * DAY_S
 
 
-def test_a_clock_that_was_set_back_lets_less_go() -> None:
-    assert cutoff(7, NOW - 100 * DAY_S, EVERY_DAY) == NOW - 107 * DAY_S
-
-
 def test_a_clock_that_began_in_1970_takes_three_days_of_those_rows() -> None:
     recorded = [TODAY, TODAY - 1, 0]
 

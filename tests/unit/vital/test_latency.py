@@ -23,16 +23,6 @@ def took(desk: Desk, hop: Segment) -> Sketch:
     return merged(stream.segments[hop].parts("1min"))
 
 
-def test_both_copies_of_a_message_are_timed_and_it_is_decided_on_once() -> None:
-    desk = Desk()
-
-    say(desk, DIRECT.id, FIWARE.id, after_s=0.120)
-
-    assert took(desk, "fiware").mean == pytest.approx(0.120)
-    assert took(desk, "robot_orion").mean == pytest.approx(0.120)
-    assert took(desk, "iveg").count == 1
-
-
 def test_a_copy_that_comes_twice_counts_once() -> None:
     desk = Desk()
     told = odometry("AGI", origin=desk.next_origin())

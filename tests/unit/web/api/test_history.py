@@ -128,22 +128,6 @@ async def test_each_kind_of_decision_has_its_sentence(
     assert (await client.get("/api/v1/decisions/D1")).json()["sentence"]["key"] == key
 
 
-async def test_a_decision_whose_texts_were_spoilt_is_still_shown(
-    client: Client, past: Past
-) -> None:
-    past.holds(decision_record(x=None), detection_record())
-    past.spoils("UPDATE decisions SET links = '[{]', rule_parameters = ''")
-    past.spoils("UPDATE detections SET box = '{'")
-
-    decision = (await client.get("/api/v1/decisions/D1")).json()
-
-    assert decision["links"] == []
-    assert decision["rule"]["parameters"] == {}
-    assert decision["position"] is None
-    [seen] = (await client.get("/api/v1/detections")).json()["items"]
-    assert seen["box"] is None
-
-
 @pytest.mark.parametrize(
     ("query", "ids"),
     [
