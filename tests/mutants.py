@@ -376,14 +376,14 @@ MUTANTS = (
     ),
     Mutant(
         "authors: whoever speaks frees robots that another has fallen silent about",
-        "if one.is_silent(self._slow_s, now):",
+        "if author.is_silent(self._slow_s, now):",
         "if False:",
         ("unit/robot/test_feedback.py",),
     ),
     Mutant(
         "authors: a count that goes on nowhere is dropped, not another author's",
-        "seq <= one.peer_feedback.newest(topic) and feedback in one.recent",
-        "seq <= one.peer_feedback.newest(topic)",
+        "seq <= author.peer_feedback.newest(topic) and feedback in author.recent",
+        "seq <= author.peer_feedback.newest(topic)",
         ("unit/robot/test_feedback.py",),
     ),
     Mutant(

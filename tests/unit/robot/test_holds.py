@@ -51,12 +51,3 @@ def test_a_file_that_cannot_be_read_is_not_an_empty_one(
     file = tmp_path / "AGI.json"
     file.write_bytes(content)
     assert read_holds(file) is None
-
-
-def test_a_write_that_fails_leaves_the_old_set(tmp_path: Path) -> None:
-    file = tmp_path / "AGI.json"
-    write_holds(file, SET)
-    (tmp_path / "AGI.json.new").mkdir()
-    with pytest.raises(OSError, match=r"AGI\.json\.new"):
-        write_holds(file, HoldSet())
-    assert read_holds(file) == SET

@@ -63,13 +63,6 @@ def test_intent_reports_and_the_single_payload_are_never_fewer(suffix: str) -> N
     assert len(measures(UplinkRates(level=LEVELS), suffix)) == 300
 
 
-def test_news_is_a_measure_at_any_level() -> None:
-    rates = UplinkRates(level=LEVELS)
-    measures(rates, "_yolox_bounding_boxes", 1.0)
-    assert rates.is_measure("_yolox_bounding_boxes", 1.0, news=True)
-    assert rates.is_measure("_yolox_bounding_boxes", 1.001, news=True)
-
-
 def test_a_backlog_is_answered_within_seconds_and_forgiven_slowly() -> None:
     rates = UplinkRates()
     now = told_for(rates, 5.0, 4.0, 0.0)

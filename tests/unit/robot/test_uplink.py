@@ -6,6 +6,7 @@ import logging
 import threading
 from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
+from typing import Literal
 
 import pytest
 
@@ -134,16 +135,6 @@ async def test_what_finds_no_broker_is_not_sent_later() -> None:
         lane.answer(message("sent"))
         await world.until_seen(1)
     assert world.seen == [b"sent"]
-
-
-async def test_reports_wait_for_no_confirmation_of_the_one_before() -> None:
-    world = World()
-    world.confirms.clear()
-    async with world.running() as lane:
-        for number in range(5):
-            lane.report(message(str(number)))
-            await world.until_seen(number + 1)
-    assert world.seen == [b"0", b"1", b"2", b"3", b"4"]
 
 
 async def test_with_sixteen_unconfirmed_the_newest_report_waits_for_room() -> None:
@@ -320,33 +311,16 @@ def test_a_look_that_sees_others_goes_through_the_agent_at_once(
     ]
 
 
-# --- unplaced ---------------------------------------------------------------------
-
-UNREAD = ("farmer", None)
-
-
-def sent(observation: Unplaced | DetectionFrame) -> tuple[str, bytes]:
-    wire: list[tuple[str, bytes]] = []
-    uplink = Uplink(
-        "AGI", "iveg", Origins("b"), lambda topic, raw: wire.append((topic, raw))
-    )
-    uplink.send(observation, START)
-    return wire[0]
-
-
-# --- what is sent -------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("kind", "device"), [("odometry", "AGI_odom"), ("scan", "AGI_lidar2D")]
 )
-def test_iveg_counts_what_has_no_place_and_places_nothing(
-    kind: str, device: str
+def test_iveg_reads_that_something_has_no_place_and_places_nothing(
+    kind: Literal["odometry", "scan"], device: str
 ) -> None:
-    unplaced = Unplaced("", Origin(), "scan" if kind == "scan" else "odometry", REST)
-    _, payload = sent(unplaced)
+    wire = Wire()
+    wire.uplink.send(Unplaced("", BLANK, kind, REST), AT)
 
-    reading = codec.read_measure(device, payload)
+    reading = codec.read_measure(device, wire.sent[0][1])
 
     assert reading.observations == ()
     assert [problem.reason for problem in reading.problems] == ["unplaced"]

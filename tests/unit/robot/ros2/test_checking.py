@@ -193,16 +193,6 @@ def test_what_is_wrong_is_said_beside_its_topic_alone(
     assert found == {topic: verdict}
 
 
-def test_a_domain_where_nobody_is_lacks_every_topic() -> None:
-    own = endpoint("/cmd_vel", ros.Twist, own=True)
-
-    rows = judge(RobotConfig(), [own], {}, (), robot_id="AGI", has_detector=True)
-
-    found = {row.topic: row.verdict for row in rows}
-    assert found["/cmd_vel"] == "drive_unheard"
-    assert found["/odom"] == "nobody publishes it (nav_msgs/msg/Odometry)"
-
-
 def test_beside_the_running_gate_only_others_are_told() -> None:
     gate = [
         replace(endpoint("/cmd_vel", ros.Twist), gate="AGI"),
