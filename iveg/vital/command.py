@@ -427,9 +427,10 @@ class Commander:
                     self._sender.start(
                         self._event_log.flushed(), f"audit-{machine.robot_id}"
                     )
-                case Closed():
-                    self.commands[effect.command.command_id] = effect.command
-                    self._event_log.closed(effect, at)
+                case Closed(command, key):
+                    self.commands[command.command_id] = command
+                    end = Changed(command.command_id, command.state, key)
+                    self._event_log.command(command, end, at)
                 case OffTable():
                     self._note_mistake(effect)
         for command in machine.commands:

@@ -30,7 +30,8 @@ from iveg.vital.core import Core
 from iveg.vital.event_log import detection_of
 from iveg.vital.record import ODOMETRY_PERIOD_S
 
-_LOGGED_S = 2.0
+_NEW_AFTER_S = 4.0
+"""Whoever comes back after so long is another sighting, and a line of the log."""
 # Frames come at 10 or 30 Hz: half a frame early must not wait a whole one.
 _KEPT_EVERY_S = 0.95 * ODOMETRY_PERIOD_S
 MOST_DETECTIONS = 5000
@@ -95,8 +96,7 @@ class DetectionTracking:
         self._event_log, self._new_id = core.event_log, core.ports.new_id
         self._tell = core.supervision.tell
         self._kept_at: dict[_Subject, float] = {}
-        """When a subject's newest row was made; ``_logged_at`` when it was seen (s)."""
-        self._logged_at: dict[_Subject, float] = {}
+        """When a subject's newest row was made (monotonic, s)."""
         self._unknown_frames: dict[str, set[str]] = {}
 
     def track_frame(
@@ -214,19 +214,18 @@ class DetectionTracking:
         )
 
     def _describe(self, one: Placed, frame: DetectionFrame, received: Received) -> None:
-        """Keep, remember and log a detection, each as often as it is worth."""
+        """Remember a detection, and keep and log it as often as it is worth."""
         at, robot_id = received.at, frame.robot_id
-        subject = robot_id, _name_of(one)
         self.newest.note(one, frame, received)
-        if at.mono - self._kept_at.get(subject, -inf) >= _KEPT_EVERY_S:
-            self._kept_at[subject] = at.mono
-            self._event_log.detection(one, frame, received)
         if one.kind == "other":
             self.other[robot_id] = at
-        unseen_s = at.mono - self._logged_at.get(subject, -inf)
-        if unseen_s >= _LOGGED_S:
-            self._logged_at[subject] = at.mono
-        if unseen_s >= 2 * _LOGGED_S:
+        subject = robot_id, _name_of(one)
+        since_s = at.mono - self._kept_at.get(subject, -inf)
+        if since_s < _KEPT_EVERY_S:
+            return
+        self._kept_at[subject] = at.mono
+        self._event_log.detection(one, frame, received)
+        if since_s >= _NEW_AFTER_S:
             self._event_log.log(_line(one, *subject), at)
 
     def witness(self, report: SafetyReport, at: Instant) -> bool:
@@ -254,14 +253,13 @@ class DetectionTracking:
 
     def forget(self, now: Instant) -> None:
         """Forget subjects who are gone."""
-        for moments in (self._kept_at, self._logged_at):
-            gone = [
-                subject
-                for subject, at in moments.items()
-                if now.mono - at > LIMITS.zone_lasts_s
-            ]
-            for subject in gone:
-                del moments[subject]
+        gone = [
+            subject
+            for subject, at in self._kept_at.items()
+            if now.mono - at > LIMITS.zone_lasts_s
+        ]
+        for subject in gone:
+            del self._kept_at[subject]
 
 
 def _name_of(one: Placed) -> str:

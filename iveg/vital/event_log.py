@@ -37,7 +37,7 @@ from iveg.domain.records import (
     ReadingRecord,
 )
 from iveg.domain.robot_state import RobotState
-from iveg.domain.stop import Changed, Closed, FollowedCommand
+from iveg.domain.stop import Changed, FollowedCommand
 from iveg.domain.stop.commands import write_command
 from iveg.domain.tracking.people import Placed
 from iveg.vital import topics
@@ -209,13 +209,6 @@ class EventLog:
         self._sink.enqueue(record)
         if step is not None:
             self._audit(record, goal.state, step, at)
-
-    @_guarded
-    def closed(self, closed: Closed, at: Instant) -> None:
-        """Record the end of a command that is no longer followed."""
-        command = closed.command
-        self.command(command, None, at)
-        self._audit(command, command.state, closed.key, at)
 
     @_guarded
     def left_over(self, row: CommandRecord, heir: str | None, at: Instant) -> None:

@@ -21,6 +21,7 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import CommandAnswer, Instant, SafetyReport
 from iveg.domain.stop.commands import (
     PLAIN,
+    CommandState,
     FollowedCommand,
     Kind,
     Press,
@@ -264,7 +265,7 @@ class Changed:
     """
 
     command_id: str
-    state: State
+    state: CommandState
     key: Key
     why: str | None = None
     commands: tuple[FollowedCommand, ...] = ()
