@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import Annotated, TypeVar
 
 import numpy as np
@@ -107,7 +108,7 @@ def write_feedback(feedback: Feedback) -> bytes:
         "robot_id": feedback.robot_id,
         "alert": None if alert is None else _fragment(_ALERT, alert),
         "robot_pose": _write_pose(feedback),
-        "alerts": _fragment(_ALERTS, feedback.alerts),
+        "alerts": _write_alerts(feedback.alerts),
         "speed_limits": _fragment(_LIMITS, limited),
         "clear": [name for name in limits if name not in limited],
         "seen": feedback.seen,
@@ -119,6 +120,12 @@ def write_feedback(feedback: Feedback) -> bytes:
     if feedback.rule:
         fields["rule"] = feedback.rule
     return orjson.dumps(fields)
+
+
+@lru_cache(maxsize=1)
+def _write_alerts(alerts: tuple[FeedbackAlert, ...]) -> orjson.Fragment:
+    """Alerts, which all robots are told at once (``benchmarks.rule_cost``)."""
+    return _fragment(_ALERTS, alerts)
 
 
 def _fragment(of: TypeAdapter[T], value: T) -> orjson.Fragment:
