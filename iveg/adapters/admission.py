@@ -101,8 +101,7 @@ class Admission:
     def give_password(self, account: Account, password: str) -> Account:
         """Put a hash in the place of another; sessions that began before are over."""
         changed = replace(account, password=password, since=self._now)
-        self._book.apply(AccessChange(self._by, "password_changed", changed))
-        return changed
+        return self._change(changed, "password_changed")
 
     def vouched(self, user: Account) -> Account:
         """Let somebody in whom a provider vouches for, under the name that they had.

@@ -141,8 +141,6 @@ class FakeIdentityProvider:
                 return StreamingResponse(_endless(), media_type="application/json")
             case "loop":
                 return RedirectResponse(str(request.url), 302)
-            case "text":
-                return Response("<html>")
             case "away":
                 return JSONResponse({"error": "server_error"}, 503)
         return None
@@ -169,8 +167,6 @@ class FakeIdentityProvider:
         keys = [{**one.as_dict(private=False), "use": "sig"} for one in self.published]
         if self.vice == "many_keys":
             keys = [{**keys[0], "kid": str(n)} for n in range(10_000)]
-        if self.vice == "hundreds_of_keys":
-            keys = [{"kty": "EC", "kid": str(n)} for n in range(500)]
         if self.vice == "large_key":
             keys[0]["n"] = "_" * 40_000
         return JSONResponse({"keys": keys})

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import segno
 from fastapi import APIRouter, Depends, Request, Response
-from pydantic import AfterValidator, Field
+from pydantic import Field
 from starlette.exceptions import HTTPException
 
 from iveg.adapters.passwords import LEAST, MOST
@@ -21,8 +21,6 @@ from iveg.domain.accounts import (
     PersonRole,
     Session,
     TokenScope,
-    is_name,
-    is_reserved,
     name_key,
 )
 from iveg.domain.errors import UnknownNameError
@@ -207,16 +205,10 @@ def _is_local(host: str) -> bool:
         return host == "localhost" or host.endswith(".localhost")
 
 
-def _named(text: str) -> str:
-    if not is_name(text) or is_reserved(text):
-        raise ValueError("not a name")
-    return text
-
-
 class _Newcomer(Body):
     """Somebody, or a program, that ends by itself after so many `days`."""
 
-    name: Annotated[str, Field(max_length=MOST_NAME), AfterValidator(_named)]
+    name: str = Field(max_length=MOST_NAME)
     days: Annotated[int, Field(ge=1, le=3650)] | None = None
 
     def ends_at(self, now: float) -> float | None:

@@ -1,4 +1,4 @@
-"""People with accounts: who gets in, by what, and until when."""
+"""People with accounts and programs with tokens: who gets in, and until when."""
 
 import asyncio
 import threading
@@ -11,27 +11,36 @@ import httpx
 import pytest
 
 from iveg.adapters.passwords import Passwords
-from iveg.domain.accounts import Account, digest_of
+from iveg.domain.accounts import Account, ApiToken, TokenScope, digest_of
+from iveg.domain.records import AuditRecord
 from iveg.web.pages.routes import router
-from tests.unit.web.desk import HOST, WebDesk
+from tests.unit.web.desk import API_TOKEN, HOST, WebDesk
 
 T = TypeVar("T")
 OWN = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
 ANA = Account("P1", "Ana Núñez", "operator", password="#acelga-1234")
 EVA = Account("P2", "Eva", "viewer", invitation=digest_of("invited"))
+SCOPES: tuple[TokenScope, ...] = ("read", "stop", "operate")
+TOKENS = [
+    ApiToken(scope, f"mes-{scope}", scope, digest_of(scope), 0) for scope in SCOPES
+]
 
 
 class PeoplesDesk(WebDesk):
-    """A desk at which two people have accounts."""
+    """A desk at which two people have accounts, and three programs tokens."""
 
     def __init__(self) -> None:
         super().__init__()
         eva = replace(EVA, invited_until=self.clock().wall + 60.0)
         self.book.accounts.update({"P1": ANA, "P2": eva})
+        self.book.tokens.update({token.digest: token for token in TOKENS})
         self.app.include_router(router(self.pages, rule=lambda: self.rules.current))
 
     def page(self) -> httpx.AsyncClient:
         return self._client(OWN)
+
+    def caller(self, token: str) -> httpx.AsyncClient:
+        return self._client({"Authorization": f"Bearer {token}"})
 
 
 @pytest.fixture
@@ -272,3 +281,53 @@ async def test_until_somebody_is_admin_every_page_says_so_and_a_program_stops(
     assert [one.status_code for one in shown] == [401, 200, 200, 403, 404]
     assert ['id="unready"' in one.text for one in shown] == [is_said] * 5
     assert stopped.status_code == 202
+
+
+@pytest.mark.parametrize(
+    ("token", "statuses"),
+    [
+        ("read", [200, 403, 403]),
+        ("stop", [200, 202, 403]),
+        ("operate", [200, 202, 200]),
+        (API_TOKEN, [200, 202, 403]),
+        ("other", [401, 401, 401]),
+        ("", [401, 401, 401]),
+    ],
+)
+async def test_a_scope_allows_what_it_says_and_no_more(
+    desk: PeoplesDesk, token: str, statuses: list[int]
+) -> None:
+    async with desk.caller(token) as program:
+        told = [
+            (await program.get("/api/v1/robots")).status_code,
+            (await program.post("/api/v1/robots/AGI/stop")).status_code,
+            (
+                await program.put("/api/v1/rule", json={"version": 1, "radius_m": 2.5})
+            ).status_code,
+        ]
+
+    assert told == statuses
+
+
+async def test_a_program_acts_by_its_own_name(desk: PeoplesDesk) -> None:
+    async with desk.caller("stop") as program:
+        await program.post("/api/v1/robots/AGI/stop")
+
+    (command,) = desk.commander.commands.values()
+    (row,) = desk.records(AuditRecord)
+    assert command.requesters == ("mes-stop",)
+    assert (row.person, row.name, row.method) == ("stop", "mes-stop", "token")
+
+
+async def test_the_last_use_is_written_once_a_minute(desk: PeoplesDesk) -> None:
+    began, kept = desk.clock().wall, list[float | None]()
+    desk.book.on_keep.append(
+        lambda: kept.append(desk.book.tokens[digest_of("read")].used_at)
+    )
+    async with desk.caller("read") as program:
+        for _ in range(3):
+            await program.get("/api/v1/robots")
+            desk.clock.now += 59.0
+
+    assert kept == [began, began + 118.0]
+    assert desk.book.tokens[digest_of("stop")].used_at is None

@@ -227,21 +227,6 @@ async def test_who_is_disabled_here_is_out_at_once_and_stays_out(
     assert "shut out" in again.text
 
 
-async def test_another_role_at_the_provider_ends_sessions_of_the_one_before(
-    desk: SignOnDesk,
-) -> None:
-    async with desk.page() as page, desk.page() as other:
-        await desk.through(page)
-        desk.clock.now += 1.0
-        desk.sign_on._reading.roles["growers"] = "viewer"  # type: ignore[index]
-        await desk.through(other)
-
-        assert desk.who(page) is None
-        now = desk.who(other)
-    assert now is not None
-    assert now.role == "viewer"
-
-
 async def test_with_the_provider_down_a_local_admin_signs_in_and_releases(
     desk: SignOnDesk,
 ) -> None:
