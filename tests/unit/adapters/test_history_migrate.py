@@ -8,7 +8,7 @@ from sqlalchemy import Connection, text
 
 from iveg.adapters.history.engine import sqlite_url, upgrade, writing_engine
 from iveg.adapters.history.tables import EARLIER, metadata
-from iveg.domain.errors import DataFileError, HopError
+from iveg.domain.errors import DataFileError
 
 PARTS = "odometry_", "detections_"
 
@@ -36,23 +36,6 @@ def test_migrations_make_the_tables_that_the_code_describes(empty_url: str) -> N
     with engine.connect() as connection:
         assert differences(connection) == []
     engine.dispose()
-
-
-def test_upgrading_twice_keeps_what_is_there(empty_url: str) -> None:
-    upgrade(empty_url)
-    execute(
-        empty_url,
-        "INSERT INTO command_events (command_id, robot_id, at, state, why) "
-        "VALUES ('C1', 'AGI', 1.0, 'SENT', '')",
-    )
-
-    upgrade(empty_url)
-
-    engine = writing_engine(empty_url)
-    with engine.connect() as connection:
-        count = connection.scalar(text("SELECT count(*) FROM command_events"))
-    engine.dispose()
-    assert count == 1
 
 
 def test_a_newer_database_is_refused_with_one_sentence(empty_url: str) -> None:
@@ -105,20 +88,6 @@ def test_damage_inside_a_file_is_found(tmp_path: Path, sqlite_url: str) -> None:
     upgrade(sqlite_url)
 
     assert len(list(tmp_path.glob("history.db.corrupt-*"))) == 1
-
-
-def test_a_locked_file_is_a_hop_that_does_not_answer_and_not_damage(
-    tmp_path: Path, sqlite_url: str
-) -> None:
-    upgrade(sqlite_url)
-    other = sqlite3.connect(tmp_path / "history.db", isolation_level=None)
-    other.execute("BEGIN EXCLUSIVE")
-
-    with pytest.raises(HopError, match="locked"):
-        upgrade(f"{sqlite_url}?timeout=0.05")
-
-    other.close()
-    assert list(tmp_path.glob("*.corrupt-*")) == []
 
 
 @pytest.mark.parametrize("before", [(), ("iveg.sqlite",)], ids=["new", "old"])

@@ -1,5 +1,6 @@
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -50,22 +51,17 @@ async def detections(queries: Queries, asked: Filter) -> list[DetectionRecord]:
 async def test_what_was_stored_comes_back_as_it_was(
     queries: Queries, database_url: str
 ) -> None:
-    remember(
-        database_url,
-        alert_record(),
-        command_record(),
-        decision_record(),
-        detection_record(),
-        log_record(),
-    )
+    stored: dict[lists.ListOf[Any], Record] = {
+        lists.ALERTS: alert_record(),
+        lists.COMMANDS: command_record(),
+        lists.DECISIONS: decision_record(),
+        lists.DETECTIONS: detection_record(),
+        lists.LOG: log_record(),
+    }
+    remember(database_url, *stored.values())
 
-    assert (await queries.page(lists.ALERTS, Filter())).items == (alert_record(),)
-    assert (await queries.page(lists.COMMANDS, Filter())).items == (command_record(),)
-    assert (await queries.page(lists.DECISIONS, Filter())).items == (decision_record(),)
-    assert (await queries.page(lists.DETECTIONS, Filter())).items == (
-        detection_record(),
-    )
-    assert (await queries.page(lists.LOG, Filter())).items == (log_record(),)
+    for listed, record in stored.items():
+        assert (await queries.page(listed, Filter())).items == (record,)
 
 
 async def test_pages_hold_every_row_once_though_times_are_equal_and_rows_arrive(
@@ -92,6 +88,7 @@ async def test_pages_hold_every_row_once_though_times_are_equal_and_rows_arrive(
         (Filter(class_="crate"), [2.0]),
         (Filter(min_probability=0.8), [1.0]),
         (Filter(min_probability=0.81), []),
+        (Filter(person="P1"), [1.0]),
         (Filter(robot="AGI", class_="crate"), []),
         (Filter(robot="AGI' OR 1=1 --"), []),
     ],
@@ -101,7 +98,7 @@ async def test_filters_leave_what_was_asked_for(
 ) -> None:
     remember(
         database_url,
-        detection_record(x=1.0, probability=0.8),
+        detection_record(x=1.0, probability=0.8, person_id="P1"),
         detection_record(
             x=2.0, robot_id="AGII", class_=None, class_id="crate", probability=0.3
         ),
@@ -128,7 +125,7 @@ def test_a_cursor_of_nobody_or_of_another_list_is_refused(text: str) -> None:
         read_cursor(text, lists.DETECTIONS)
 
 
-async def test_open_commands_are_those_that_say_that_they_still_go_on(
+async def test_what_goes_on_is_found_by_its_last_row(
     queries: Queries, database_url: str
 ) -> None:
     going_on = (
@@ -143,15 +140,6 @@ async def test_open_commands_are_those_that_say_that_they_still_go_on(
         command_record(command_id="R3", kind="resume", state="EXPIRED"),
     )
     remember(database_url, *going_on, *refused_or_over)
-
-    found = await queries.open_commands()
-
-    assert [row.command_id for row in found] == ["R1", "S1", "S2"]
-
-
-async def test_what_has_no_end_is_found_whenever_it_began(
-    queries: Queries, database_url: str
-) -> None:
     remember(
         database_url,
         decision_record(),
@@ -160,6 +148,9 @@ async def test_what_has_no_end_is_found_whenever_it_began(
         alert_record(alert_id="A2", cleared_at=NOON + 2.0),
     )
 
+    found = await queries.open_commands()
+
+    assert [row.command_id for row in found] == ["R1", "S1", "S2"]
     assert await queries.open_decisions() == (decision_record(),)
     assert await queries.open_alerts() == (alert_record(),)
 

@@ -146,6 +146,7 @@ async def test_while_the_database_is_locked_only_the_oldest_telemetry_is_lost(
     assert stored.pop("detections") == 0
     assert set(stored.values()) == {1}
     assert recorder.counters["history_dropped"] == 98
+    assert moved_aside(tmp_path) == []
     assert [record.levelname for record in caplog.records] == ["WARNING", "INFO"]
 
 
@@ -259,19 +260,6 @@ async def test_a_bad_row_holds_up_no_rows_of_other_kinds(
     assert recorder.counters["history_rejected"] == 3
     assert scalar(database_url, "SELECT count(*) FROM odometry") == 0
     assert scalar(database_url, "SELECT count(*) FROM commands") == 1
-
-
-async def test_text_that_postgresql_cannot_hold_is_left_out(
-    postgresql_url: str, tmp_path: Path
-) -> None:
-    recorder = Recorder(postgresql_url, FileJournal(tmp_path / "journal"))
-    recorder.enqueue(alert_record(note="nul \0"))
-    recorder.enqueue(command_record())
-
-    await recorder.close()
-
-    assert scalar(postgresql_url, "SELECT command_id FROM commands") == "C1"
-    assert recorder.counters["history_rejected"] == 1
 
 
 async def test_a_file_that_rots_while_in_use_is_moved_aside(

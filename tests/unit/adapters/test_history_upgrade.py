@@ -118,6 +118,5 @@ def test_the_audit_goes_on_behind_its_rows_and_stays_guarded(file: Path) -> None
     with closing(sqlite3.connect(file)) as connection:
         seqs = connection.execute("SELECT seq, audit_id FROM audit ORDER BY seq")
         assert seqs.fetchall() == [(1, "U1"), (2, "U2"), (3, "U3"), (4, "U4")]
-        for statement in ("DELETE FROM audit", "UPDATE audit SET name = 'Eva'"):
-            with pytest.raises(sqlite3.IntegrityError, match="append-only"):
-                connection.execute(statement)
+        with pytest.raises(sqlite3.IntegrityError, match="append-only"):
+            connection.execute("DELETE FROM audit")

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from iveg.domain.latency import SLICE_S, Series, Sketch, merged
+from iveg.domain.latency import SLICE_S, Series, Sketch, Window, merged
 from tests.data import latencies
 
 SHARES = (0.5, 0.9, 0.95, 0.99)
 SLICES_A_MINUTE = round(60 / SLICE_S)
+WINDOWS: tuple[Window, ...] = "1min", "15min", "24h"
 
 
 def sketch_of(values: NDArray[np.float64]) -> Sketch:
@@ -32,20 +33,7 @@ def test_quantiles_of_recorded_samples_are_within_one_percent(hop: str) -> None:
         assert sketch.quantile(share) == pytest.approx(exact(values, share), rel=0.01)
 
 
-def test_many_sketches_together_are_as_one_of_all_their_samples() -> None:
-    values = latencies.recorded("robot_orion")
-
-    whole = sketch_of(values)
-    parts = merged(sketch_of(part) for part in np.array_split(values, 37))
-
-    assert [parts.quantile(share) for share in SHARES] == [
-        whole.quantile(share) for share in SHARES
-    ]
-    assert parts.count == whole.count
-    assert parts.mean == pytest.approx(whole.mean)
-
-
-def filled(minutes: int, each: float = 0.010) -> Series:
+def filled(minutes: int, each: float) -> Series:
     """A series of one sample a slice; of minute m they are m + 1 times ``each``."""
     series = Series()
     for slice_ in range(minutes * SLICES_A_MINUTE):
@@ -55,19 +43,11 @@ def filled(minutes: int, each: float = 0.010) -> Series:
 
 
 def test_a_window_holds_its_own_time_and_no_more() -> None:
-    series = filled(minutes=130)
-
-    counts = {
-        window: merged(series.parts(window)).count
-        for window in ("1min", "15min", "24h")
-    }
-
-    assert counts == {"1min": 6, "15min": 90, "24h": 780}
-    assert merged(series.parts("1min")).mean == pytest.approx(1.30)
-
-
-def test_what_is_older_than_a_day_is_forgotten() -> None:
     series = filled(minutes=25 * 60, each=0.001)
 
-    assert merged(series.parts("24h")).count == 24 * 360
-    assert merged(series.parts("24h")).quantile(0.0) == pytest.approx(0.061, rel=0.01)
+    minute, quarter, day = (merged(series.parts(one)) for one in WINDOWS)
+
+    assert (minute.count, quarter.count, day.count) == (6, 90, 24 * 360)
+    assert minute.mean == pytest.approx(1.500)
+    # The first hour is forgotten.
+    assert day.quantile(0.0) == pytest.approx(0.061, rel=0.01)

@@ -303,19 +303,3 @@ async def test_each_column_of_what_was_measured_is_a_key_of_its_json(
         lines = (await client.get(f"/api/v1/{path}?format=csv")).text
         [row] = csv.DictReader(io.StringIO(lines))
         assert row == {name: exports.cell(item[name]) for name in row}
-
-
-async def test_a_track_is_what_was_seen_of_one_person(
-    client: Client, past: Past
-) -> None:
-    past.holds(
-        detection_record(at=NOON, person_id="P1-5f0c9a12"),
-        detection_record(at=NOON + 1.0, person_id="P2-5f0c9a12"),
-        detection_record(at=NOON + 2.0, person_id=None),
-    )
-
-    every = (await client.get("/api/v1/tracks")).json()["items"]
-    one = (await client.get("/api/v1/tracks?person=P1-5f0c9a12")).json()["items"]
-
-    assert [row["person_id"] for row in every] == ["P2-5f0c9a12", "P1-5f0c9a12"]
-    assert [row["person_id"] for row in one] == ["P1-5f0c9a12"]

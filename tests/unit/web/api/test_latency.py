@@ -52,17 +52,3 @@ async def test_each_hop_is_told_with_its_count_mean_and_quantiles() -> None:
         "count": 0,
         **dict.fromkeys(("mean_ms", "p50_ms", "p95_ms", "p99_ms")),
     }
-
-
-async def test_what_the_paper_printed_stands_beside_it() -> None:
-    paper = (await ask(WebDesk()))["paper"]
-
-    assert paper["field"]["odometry"] == {
-        "uplink_mean": 16.9,
-        "uplink_p95": 103.9,
-        "fiware_mean": 121.3,
-        "fiware_p95": 212.6,
-        "total_mean": 138.2,
-        "total_p95": 316.5,
-    }
-    assert paper["simulation"]["lidar"]["total_p95"] == 168.5
