@@ -378,7 +378,7 @@ MUTANTS = (
         "authors: whoever speaks frees robots that another has fallen silent about",
         "if author.is_silent(self._slow_s, now):",
         "if False:",
-        ("unit/robot/test_feedback.py",),
+        ("properties/test_robot_safety.py",),
     ),
     Mutant(
         "authors: a count that goes on nowhere is dropped, not another author's",

@@ -42,11 +42,6 @@ def resolve_box(
     Returns:
         None in place of a box whose frame nobody described.
     """
-    # Nearly all are in one of these; 30 pictures of each robot come in a second.
-    if detection.frame_id == "base_link":
-        return (FramedBox(detection.box, "base_link"),)
-    if detection.frame_id == "map":
-        return (FramedBox(detection.box, "map"),)
     return tuple(
         _in_known_frame(detection.box, frame, robot.profile)
         for frame in _frames_of(detection.frame_id, robot)

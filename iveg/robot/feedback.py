@@ -445,8 +445,7 @@ class Authors:
 
     def _forget(self, now: float) -> None:
         last = now - LIMITS.zone_lasts_s
-        if any(author.spoke_at < last for author in self._kept):
-            self._kept = [author for author in self._kept if author.spoke_at >= last]
+        self._kept = [author for author in self._kept if author.spoke_at >= last]
 
     def _named(self, boot: str) -> Iterator[Author]:
         return (author for author in self._kept if author.boot == boot)

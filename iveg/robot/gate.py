@@ -73,8 +73,7 @@ def known_reason(reason: str) -> str:
 
 def lowest(caps: Iterable[Cap]) -> Cap:
     """The effective cap: lowest factor; if equal, people, then robots, then silence."""
-    asked = [cap for cap in caps if cap is not FREE]
-    return min((*asked, FREE), key=Cap._order) if asked else FREE
+    return min((*caps, FREE), key=Cap._order)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +90,6 @@ class AppliedCap:
 
     def settle(self, raw: Cap, now: float) -> "AppliedCap":
         """Apply the present raw cap: a lower one at once, a higher one after 1.0 s."""
-        if raw is self.cap and self.waiting is None:
-            return self
         if raw.factor <= self.cap.factor:
             return AppliedCap(raw)
         if self.waiting is None:

@@ -115,8 +115,6 @@ class NodeSettings:
 _log = logging.getLogger(__name__)
 _GATE_EVERY_S = 0.04
 """25 Hz, so that a late timer still gives the drive its 20."""
-_SAID_WITHIN_S = 0.03
-"""Odometry, upstream twist and feedback that arrive together give one drive command."""
 
 
 class RobotNode:
@@ -150,7 +148,6 @@ class RobotNode:
         self._on_peer_scan: Callable[[str, bytes], None] | None = None
         self.asks_for_scans = False
         self.faults: tuple[RobotFault, ...] = ()
-        self._commanded: tuple[Twist2D, float] = REST, 0.0
         self._goals = RobotGoals(robot_id, navigate)
         self._placed: tuple[Pose2D | None, float] = None, 0.0
         """Newest pose, and when it came (monotonic, s)."""
@@ -344,7 +341,7 @@ class RobotNode:
         for effect in effects:
             match effect:
                 case Drive(twist):
-                    self._command_drive(twist, now)
+                    self._drive(twist)
                 case Persist(holds):
                     self._lane.persist(holds)
                 case SendAnswer(answer):
@@ -363,14 +360,6 @@ class RobotNode:
             pose if now - at <= LIMITS.pose_stand_s else None,
             self.machine.stands(now),
         )
-
-    def _command_drive(self, twist: Twist2D, now: float) -> None:
-        """Send zero and changes at once; do not repeat a command just sent."""
-        commanded, at = self._commanded
-        if twist == commanded and twist != REST and now - at < _SAID_WITHIN_S:
-            return
-        self._commanded = twist, now
-        self._drive(twist)
 
     def _answer(self, *answers: CommandAnswer | GoalAnswer) -> None:
         for answer in answers:

@@ -5,7 +5,6 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -220,8 +219,6 @@ class Boxes:
 # Without a mask the target is the part of the box at about the depth of its middle: the
 # whole box would include the wall behind a person.
 
-_Pixel = TypeVar("_Pixel", bound=np.generic)
-
 _SQUARE = 0.02
 _ANY = 255
 _THICK_M = 0.5
@@ -306,13 +303,15 @@ def grounded(
         settings: Parameters that the paper leaves open.
 
     Raises:
-        UnreadableError: ``bad_picture``: the detector's picture has another size.
+        UnreadableError: ``bad_picture``: boxes or mask are of another size.
     """
     camera = picture.camera
     if look.width and (look.width, look.height) != (camera.width, camera.height):
         detail = f"boxes in {look.width} × {look.height}"
         raise UnreadableError("bad_picture", detail)
     owners = None if mask is None else _pixels(mask, _MASKS.get(mask.encoding, "u1"))
+    if owners is not None and owners.shape != picture.depth.shape:
+        raise UnreadableError("bad_picture", f"a mask of {owners.shape}")
     answers = [
         (
             class_id_of(box.results),
@@ -354,27 +353,17 @@ def _segment(
     if not all(map(np.isfinite, numbers)) or max(map(abs, numbers)) > EDGE_LIMIT:
         raise UnreadableError("bad_box", "a box that is none")
     width, height = max(1, round(box.size_x)), max(1, round(box.size_y))
-    corner = top_left(centre.x, centre.y, width, height)
+    left, top = top_left(centre.x, centre.y, width, height)
+    rows, columns = picture.depth.shape
+    # Detectors draw boxes over the edges of a picture.
+    x0, x1 = (min(max(0, x), columns) for x in (left, left + width))
+    y0, y1 = (min(max(0, y), rows) for y in (top, top + height))
     if owners is None:
-        own = _as_far_as_the_middle(_cut(picture.depth, corner, width, height))
+        own = _as_far_as_the_middle(picture.depth[y0:y1, x0:x1])
     else:
-        part = _cut(owners, corner, width, height)
+        part = owners[y0:y1, x0:x1]
         own = (part == number) | (part == _ANY)
-    return Segment(class_id, probability, centre.x, centre.y, own)
-
-
-def _cut(
-    picture: NDArray[_Pixel], corner: tuple[int, int], width: int, height: int
-) -> NDArray[_Pixel]:
-    """Part of a picture, zero beyond its edges; shape (height, width)."""
-    left, top = corner
-    part = np.zeros((height, width), picture.dtype)
-    rows, columns = picture.shape
-    y0, y1 = max(0, top), min(rows, top + height)
-    x0, x1 = max(0, left), min(columns, left + width)
-    if y0 < y1 and x0 < x1:
-        part[y0 - top : y1 - top, x0 - left : x1 - left] = picture[y0:y1, x0:x1]
-    return part
+    return Segment(class_id, probability, (x0 + x1) / 2, (y0 + y1) / 2, own)
 
 
 def _as_far_as_the_middle(depth: NDArray[np.float32]) -> NDArray[np.bool_]:

@@ -166,9 +166,7 @@ def read_hypothesis(
     """
     if not results:
         raise UnreadableError("no_class", "a detection without a hypothesis")
-    best = results[0].hypothesis
-    if len(results) > 1:
-        best = max((result.hypothesis for result in results), key=_score)
+    best = max((result.hypothesis for result in results), key=_score)
     if not 0.0 <= best.score <= 1.0:
         raise UnreadableError("bad_probability", f"{best.score}")
     name = clean(best.class_id)
@@ -308,8 +306,6 @@ class InputFaults:
 
     def faults(self, now: float) -> tuple[RobotFault, ...]:
         """Present faults, in the order of their start."""
-        if not self._noted:
-            return ()
         self._noted = {
             key: fault
             for key, fault in self._noted.items()

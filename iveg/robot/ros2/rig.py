@@ -153,8 +153,7 @@ class Ros2Robot:
         faults = self._faults.faults(now)
         self.node.limit(*speed_of(faults))
         self.node.faults = faults
-        if faults or self._said:
-            self._log(faults)
+        self._log(faults)
 
     def _log(self, faults: tuple[RobotFault, ...]) -> None:
         """Log each fault once at its start and once at its end."""

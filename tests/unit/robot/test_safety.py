@@ -193,6 +193,18 @@ def test_the_answer_to_an_order_names_its_attempt() -> None:
     assert rig.stop("01STOP").attempt is None
 
 
+def test_a_refused_attempt_stays_refused_when_all_would_be_right() -> None:
+    rig = Rig(speed=Twist2D(0.0, 0.05), obeys=False).run(0.5)
+    order = release(["boot-b1"], rig.machine.challenge, "01TRY")
+    first = rig.command(order)
+    rig.speed = REST
+    rig.run(1.0)
+    again = rig.command(order)
+    assert (first.why, again.why) == ("not_standing", "not_standing")
+    assert again.attempt == "01TRY"
+    assert rig.holds
+
+
 def test_an_attempt_that_is_forgotten_cannot_act_either() -> None:
     rig = Rig().run(0.5)
     order = release(["boot-b1"], rig.machine.challenge, "01TRY")
