@@ -13,9 +13,7 @@ _TO_DO = """
     adapters/mqtt adapters/oidc adapters/passwords adapters/toml_files
     adapters/worker app/door cli/robot comfort/messenger comfort/shadow_run
     domain/accounts domain/audit domain/kinds domain/observations domain/peer_scan
-    domain/probe domain/quantities domain/transports
-   
-    ngsi/codec/attributes
+    domain/probe domain/quantities domain/transports ngsi/codec/attributes
     ngsi/codec/feedback setting_types settings vital/__init__ vital/evaluate
     vital/event_log vital/log_messages vital/supervision web/api/account
     web/api/goals web/build web/live/pictures web/pages/signing web/refusals

@@ -12,15 +12,18 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from http import HTTPStatus
 
 import orjson
 
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.post_listener import post_listener
+from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import REST, Twist2D
 from iveg.domain.observations import Climate, Instant
 from iveg.domain.stamps import format_stamp
-from iveg.lab.emulator.orders import FaultOrder, open_fault_port
+from iveg.lab.emulator.orders import FaultOrder, read_order
 from iveg.lab.emulator.ros2_base import Ros2Base
 from iveg.lab.emulator.world import EmulatedSensors, RobotHardware, SimulatedWorld
 from iveg.ngsi import names
@@ -231,39 +234,15 @@ class EmulatedRobot:
 _CLIMATE_EVERY_S = 10.0
 
 
-async def run_emulator(
-    world: SimulatedWorld,
-    settings: FleetSettings,
-    *,
-    fault_port: int | None = None,
-    network: Network | None = None,
-) -> None:
-    """Run a world in real time until cancelled.
+class SimulatedFleet:
+    """Robots and people of a run, advanced in real time.
 
     Args:
         world: Robots and people.
         settings: Those of all robots; the directory of the hold files is made if
             missing.
-        fault_port: Loopback port for fault orders; None has none.
         network: DDS: the robots are ROS 2 bases there, controlled by ``iveg robot``;
             topics are below ``/`` and the robot's id in lower case.
-
-    Raises:
-        SettingsError: the fault port is in use.
-    """
-    fleet = SimulatedFleet(world, settings, network)
-    if fault_port is None:
-        await fleet.run()
-        return
-    async with open_fault_port(fault_port, fleet.obey):
-        await fleet.run()
-
-
-class SimulatedFleet:
-    """Robots and people of a run, advanced in real time.
-
-    Args:
-        network: DDS of ROS 2 robots without iVeg's software; None: robots have it.
     """
 
     def __init__(
@@ -284,6 +263,18 @@ class SimulatedFleet:
                 self._robots[robot_id] = Ros2Base(
                     rig, world, network, config, settings.rate_hz
                 )
+
+    async def run_with_faults(self, port: int) -> None:
+        """Run until cancelled, and take fault orders on this port of loopback.
+
+        ``POST /`` with a ``FaultOrder``; 204 when done, 400 when it cannot be read,
+        with a sentence that names the field, 409 when there is no such robot.
+
+        Raises:
+            OSError: the port is in use.
+        """
+        async with post_listener(self._obey, "127.0.0.1", port):
+            await self.run()
 
     async def run(self) -> None:
         """Run until cancelled."""
@@ -312,14 +303,13 @@ class SimulatedFleet:
             tasks.create_task(link.run(), name="climate-link")
             await every(_CLIMATE_EVERY_S, measure)
 
-    def obey(self, order: FaultOrder) -> str | None:
-        """Execute a fault order.
-
-        Returns:
-            None, or the reason why it cannot be done.
-        """
+    def _obey(self, body: bytes) -> tuple[HTTPStatus, str]:
+        try:
+            order = read_order(body)
+        except UnreadableError as error:
+            return HTTPStatus.BAD_REQUEST, str(error)
         robot = self._robots.get(order.robot)
         if robot is None:
-            return f"there is no robot {order.robot}"
+            return HTTPStatus.CONFLICT, f"there is no robot {order.robot}"
         robot.obey(order)
-        return None
+        return HTTPStatus.NO_CONTENT, ""
