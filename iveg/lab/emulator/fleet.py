@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from http import HTTPStatus
+from typing import NamedTuple
 
 import orjson
 
@@ -56,41 +57,41 @@ def climate_at(wall: float) -> Climate:
     )
 
 
-Measures = Mapping[str, float]
-_HOUR_S = 3600.0
+class Wave(NamedTuple):
+    """A measure that swings about its mean."""
+
+    mean: float
+    swing: float
+    period_s: float
 
 
-def fertigation_at(wall: float) -> Measures:
-    """Nutrient solution at a time (Unix s): flows in the first third of each hour."""
-    phase = (wall % _HOUR_S) / _HOUR_S
-    swing = math.sin(wall / 400.0)
-    return {
-        "conductivity": round(2.4 + 0.25 * swing, 3),
-        "acidity": round(5.8 + 0.15 * math.cos(wall / 300.0), 2),
-        "flow": 18.5 if phase < 1 / 3 else 0.0,
-    }
-
-
-def osmosis_at(wall: float) -> Measures:
-    """Permeate and pressure: the membrane fouls until its rinse, each two hours."""
-    fouling = (wall % (2 * _HOUR_S)) / (2 * _HOUR_S)
-    return {
-        "permeateConductivity": round(70.0 + 40.0 * fouling, 1),
-        "pressure": round(9.0 + 2.5 * fouling, 2),
-    }
-
-
-EQUIPMENT: Mapping[str, Callable[[float], Measures]] = {
-    "fertigation-1": fertigation_at,
-    "osmosis-1": osmosis_at,
+EQUIPMENT: Mapping[str, Mapping[str, Wave]] = {
+    "fertigation-1": {
+        "conductivity": Wave(2.4, 0.25, 2500.0),
+        "acidity": Wave(5.8, 0.15, 1900.0),
+        "flow": Wave(9.25, 9.25, 3600.0),
+    },
+    "osmosis-1": {
+        "permeateConductivity": Wave(90.0, 20.0, 7200.0),
+        "pressure": Wave(10.25, 1.25, 7200.0),
+    },
 }
-"""By device."""
+"""Measures of other equipment, by device."""
+
+
+def measures_of(device: str, wall: float) -> dict[str, float]:
+    """Values of a device at a time (Unix s)."""
+    return {
+        name: round(mean + swing * math.sin(wall / period_s * math.tau), 3)
+        for name, (mean, swing, period_s) in EQUIPMENT[device].items()
+    }
 
 
 def send_equipment(link: MqttLink, apikey: str, wall: float) -> None:
     """Have each device send what it measures now."""
-    for device, measure in EQUIPMENT.items():
-        payload = orjson.dumps({**measure(wall), "TimeInstant": format_stamp(wall)})
+    for device in EQUIPMENT:
+        measures = measures_of(device, wall)
+        payload = orjson.dumps({**measures, "TimeInstant": format_stamp(wall)})
         link.enqueue(names.measure_topic(apikey, device), payload)
 
 
