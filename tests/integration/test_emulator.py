@@ -17,7 +17,7 @@ from iveg.domain.observations import (
     Odometry,
 )
 from iveg.lab.emulator.camera import DETECTORS
-from iveg.lab.emulator.fleet import FleetSettings, run_emulator
+from iveg.lab.emulator.fleet import FleetSettings, SimulatedFleet
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
@@ -42,13 +42,10 @@ def emulator(
 ) -> asyncio.Task[None]:
     layout = lay_out(scenario_named("nlos"), FLEET, TESTBED)
     node = NodeSettings(address=address, apikey="iveg", directory=folder / "state")
-    return asyncio.create_task(
-        run_emulator(
-            SimulatedWorld(TESTBED, layout, DETECTORS["perfect"], seed=1),
-            FleetSettings(node),
-            fault_port=port,
-        )
-    )
+    world = SimulatedWorld(TESTBED, layout, DETECTORS["perfect"], seed=1)
+    fleet = SimulatedFleet(world, FleetSettings(node))
+    work = fleet.run() if port is None else fleet.run_with_faults(port)
+    return asyncio.create_task(work)
 
 
 async def test_robots_publish_all_that_the_contract_names_in_order_and_cleanly(

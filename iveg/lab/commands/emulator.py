@@ -15,7 +15,7 @@ from iveg.cli.nodes import node_settings
 from iveg.cli.running import report_ready, run_until_stopped, tune_garbage_collection
 from iveg.domain.witness import Plan
 from iveg.lab.emulator.camera import DETECTORS
-from iveg.lab.emulator.fleet import FleetSettings, run_emulator
+from iveg.lab.emulator.fleet import FleetSettings, SimulatedFleet
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import SimulatedWorld
@@ -47,7 +47,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
         greenhouse = load_greenhouse(settings.greenhouse)
         layout = lay_out(scenario_named(options.scenario), robots, greenhouse, fleet)
         detector = DETECTORS[options.profile]
-        work = run_emulator(
+        emulated = SimulatedFleet(
             SimulatedWorld(greenhouse, layout, detector, options.seed),
             FleetSettings(
                 node_settings(settings, Path(directory), Plan.of(greenhouse)),
@@ -55,11 +55,13 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
                 options.hz,
                 has_equipment=settings.equipment == DEMO,
             ),
-            fault_port=options.fault_port,
-            network=network,
+            network,
         )
         report_ready()
-        await work
+        if options.fault_port is None:
+            await emulated.run()
+        else:
+            await emulated.run_with_faults(options.fault_port)
 
 
 def _network(options: argparse.Namespace) -> "AbstractContextManager[Dds | None]":

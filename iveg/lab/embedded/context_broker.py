@@ -143,10 +143,11 @@ class ContextBroker:
         self, scope: Scope, entity: Entity, changes: Mapping[str, Attribute]
     ) -> None:
         """Change attributes; create the missing ones; notify."""
-        changed = entity.apply(changes, scope.now)
+        now = clock.wall()
+        changed = entity.apply(changes, now)
         for subscription in self.tenant(scope.service).subscriptions.values():
-            if subscription.wants(entity, changed, scope.now):
-                subscription.notify(entity, scope.now)
+            if subscription.wants(entity, changed, now):
+                subscription.notify(entity, now)
 
     # --- updates that may have to be passed on ----------------------------------
 
@@ -242,7 +243,7 @@ class _Call:
         path = request.headers.get("fiware-servicepath", "/")
         if _PATH.fullmatch(path) is None:
             raise bad_request("Bad Character in Service-Path")
-        self.scope = Scope(service, path, clock.wall())
+        self.scope = Scope(service, path)
         self.tenant = broker.tenant(service)
 
     def changes(self, raw: Mapping[str, Any]) -> dict[str, Attribute]:

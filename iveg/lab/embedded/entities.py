@@ -307,17 +307,15 @@ class Entity:
 
 
 class Scope(NamedTuple):
-    """Tenant and service path of a request, and its time.
+    """Tenant and service path of a request.
 
     Attributes:
         service: Tenant, lower case; empty for the default one.
-        path: Service path.
-        now: Seconds, Unix time.
+        path: Service path; the agent calls it subservice.
     """
 
     service: str
     path: str
-    now: float
 
 
 class EntityView(NamedTuple):

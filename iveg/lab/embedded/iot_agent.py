@@ -10,7 +10,7 @@ invalid ``TimeInstant``.
 import logging
 from collections.abc import Iterable, Mapping
 from functools import cached_property
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import orjson
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -39,21 +39,12 @@ from iveg.lab.embedded.mqtt_broker import MqttBroker
 # --- groups and devices -----------------------------------------------------------
 
 _Read = TypeVar("_Read", bound="_Provisioned")
-_NONE_YET: list[object] = Field([], max_length=0)
-"""What the embedded agent cannot do is refused, not ignored."""
 
 
 def _wrong_syntax() -> FiwareError:
     return FiwareError(
         "WRONG_SYNTAX", "Wrong syntax in request: Errors found validating request."
     )
-
-
-class Tenancy(NamedTuple):
-    """Service and subservice that a request is about."""
-
-    service: str
-    subservice: str
 
 
 class DeviceAttribute(BaseModel):
@@ -72,7 +63,10 @@ class DeviceCommand(BaseModel):
 
 
 class _Provisioned(BaseModel):
-    """Fields of groups and devices alike; other fields are taken and ignored."""
+    """Fields of groups and devices alike; other fields are taken and ignored.
+
+    Lazy and static attributes, which the embedded agent cannot do, are refused.
+    """
 
     model_config = ConfigDict(frozen=True)
 
@@ -80,9 +74,9 @@ class _Provisioned(BaseModel):
     service: str
     entity_type: str
     attributes: list[DeviceAttribute] = []
-    lazy: list[object] = _NONE_YET
+    lazy: list[object] = Field([], max_length=0)
     commands: list[DeviceCommand] = []
-    static_attributes: list[object] = _NONE_YET
+    static_attributes: list[object] = Field([], max_length=0)
 
 
 class Group(_Provisioned):
@@ -212,15 +206,15 @@ class IotAgent:
         mqtt: The MQTT broker that devices use.
 
     Attributes:
-        groups: By tenancy, resource and API key, oldest first.
-        devices: By tenancy, API key and id, oldest first.
+        groups: By tenant and path, resource and API key, oldest first.
+        devices: By tenant and path, API key and id, oldest first.
     """
 
     def __init__(self, broker: ContextBroker, mqtt: MqttBroker) -> None:
         self._broker = broker
         self._mqtt = mqtt
-        self.groups: dict[tuple[Tenancy, str, str], Group] = {}
-        self.devices: dict[tuple[Tenancy, str, str], AgentDevice] = {}
+        self.groups: dict[tuple[Scope, str, str], Group] = {}
+        self.devices: dict[tuple[Scope, str, str], AgentDevice] = {}
         self._by_place: dict[str, AgentDevice] = {}
         self._url = ""
         mqtt.listen(self.hear)
@@ -247,21 +241,19 @@ class IotAgent:
             return
         now = clock.wall()
         try:
-            self._write(device, _READERS[kind](device, payload, now), now)
+            self._write(device, _READERS[kind](device, payload, now))
         except FiwareError as error:
             # Devices get no error.
             _log.debug("a message on %s was discarded: %s", topic, error)
 
-    def _write(
-        self, device: AgentDevice, changes: Mapping[str, Attribute], now: float
-    ) -> None:
+    def _write(self, device: AgentDevice, changes: Mapping[str, Attribute]) -> None:
         if changes:
-            scope = Scope(device.service, device.service_path, now)
+            scope = Scope(device.service, device.service_path)
             self._broker.upsert(scope, device.entity_name, device.entity_type, changes)
 
     # --- devices ----------------------------------------------------------------
 
-    def provision(self, raw: Mapping[str, Any], tenancy: Tenancy) -> None:
+    def provision(self, raw: Mapping[str, Any], scope: Scope) -> None:
         """Create one device from a ``POST``, and register its commands.
 
         Raises:
@@ -273,10 +265,10 @@ class IotAgent:
                 "The request was not well formed:"
                 'Missing attributes: ["device_id"] with: the device',
             )
-        service, path = tenancy
+        service, path = scope
         made = {"service": service, "service_path": path, "registration_id": new_id()}
         device = _read(AgentDevice, {**raw, **made})
-        key = tenancy, device.apikey, device.device_id
+        key = scope, device.apikey, device.device_id
         if key in self.devices:
             raise FiwareError(
                 "DUPLICATE_DEVICE_ID",
@@ -291,14 +283,14 @@ class IotAgent:
             )
         self.devices[key] = self._by_place[device.place] = device
 
-    def forget(self, tenancy: Tenancy, device_id: str) -> None:
+    def forget(self, scope: Scope, device_id: str) -> None:
         """Delete a device and its registration.
 
         Raises:
             FiwareError: 404.
         """
         for key, device in self.devices.items():
-            if key[0] == tenancy and device.device_id == device_id:
+            if key[0] == scope and device.device_id == device_id:
                 break
         else:
             raise _no_device(device_id)
@@ -327,7 +319,7 @@ class IotAgent:
         found = [
             device
             for key, device in sorted(self.devices.items(), key=lambda item: item[0])
-            if key[0] == (scope.service, scope.path)
+            if key[0] == scope
             and (device.entity_name, device.entity_type) == (name, kind)
         ]
         if not found:
@@ -337,7 +329,7 @@ class IotAgent:
             self._mqtt.publish(
                 f"{device.place}/cmd", orjson.dumps({command: values[command]})
             )
-            self._write(device, _status_change(command, "PENDING", now), now)
+            self._write(device, _status_change(command, "PENDING", now))
 
 
 def _no_device(name: str) -> FiwareError:
@@ -378,16 +370,16 @@ class _NorthPort:
         return _json(_ABOUT)
 
     async def list_groups(self, request: Request) -> Response:
-        tenancy = _tenancy(request)
+        scope = _scope(request)
         groups = [
             group.model_dump(exclude_none=True)
             for key, group in self._agent.groups.items()
-            if key[0] == tenancy
+            if key[0] == scope
         ]
         return _page(request, "services", groups)
 
     async def create_groups(self, request: Request) -> Response:
-        tenancy = _tenancy(request)
+        scope = _scope(request)
         for raw in await _listed(request, "services"):
             if not raw.get("entity_type"):
                 raise FiwareError(
@@ -395,8 +387,9 @@ class _NorthPort:
                     "The following mandatory configuration parameters were missing: "
                     '["type"]',
                 )
-            group = _read(Group, {**raw, **tenancy._asdict()})
-            key = tenancy, group.resource, group.apikey
+            mine = {"service": scope.service, "subservice": scope.path}
+            group = _read(Group, {**raw, **mine})
+            key = scope, group.resource, group.apikey
             if key in self._agent.groups:
                 raise FiwareError(
                     "DUPLICATE_GROUP",
@@ -411,7 +404,7 @@ class _NorthPort:
         resource, apikey = (
             request.query_params.get(name, "") for name in ("resource", "apikey")
         )
-        key = _tenancy(request), resource, apikey
+        key = _scope(request), resource, apikey
         raw, group = await _object(request), self._agent.groups.get(key)
         if group is None:
             raise FiwareError(
@@ -424,26 +417,26 @@ class _NorthPort:
         return Response(status_code=204)
 
     async def list_devices(self, request: Request) -> Response:
-        tenancy = _tenancy(request)
+        scope = _scope(request)
         devices = [
             device.show()
             for key, device in self._agent.devices.items()
-            if key[0] == tenancy
+            if key[0] == scope
         ]
         return _page(request, "devices", devices)
 
     async def create_devices(self, request: Request) -> Response:
-        tenancy = _tenancy(request)
+        scope = _scope(request)
         for raw in await _listed(request, "devices"):
-            self._agent.provision(raw, tenancy)
+            self._agent.provision(raw, scope)
         return _json({}, 201)
 
     async def delete_device(self, request: Request) -> Response:
-        self._agent.forget(_tenancy(request), request.path_params["id"])
+        self._agent.forget(_scope(request), request.path_params["id"])
         return Response(status_code=204)
 
 
-def _tenancy(request: Request) -> Tenancy:
+def _scope(request: Request) -> Scope:
     names = "fiware-service", "fiware-servicepath"
     missing = [name for name in names if not request.headers.get(name)]
     if missing:
@@ -453,7 +446,7 @@ def _tenancy(request: Request) -> Tenancy:
             + orjson.dumps(missing).decode(),
         )
     service, path = (request.headers[name] for name in names)
-    return Tenancy(service.lower(), path)
+    return Scope(service.lower(), path)
 
 
 async def _object(request: Request) -> dict[str, Any]:

@@ -12,15 +12,19 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from http import HTTPStatus
+from typing import NamedTuple
 
 import orjson
 
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.post_listener import post_listener
+from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import REST, Twist2D
 from iveg.domain.observations import Climate, Instant
 from iveg.domain.stamps import format_stamp
-from iveg.lab.emulator.orders import FaultOrder, open_fault_port
+from iveg.lab.emulator.orders import FaultOrder, read_order
 from iveg.lab.emulator.ros2_base import Ros2Base
 from iveg.lab.emulator.world import EmulatedSensors, RobotHardware, SimulatedWorld
 from iveg.ngsi import names
@@ -53,41 +57,41 @@ def climate_at(wall: float) -> Climate:
     )
 
 
-Measures = Mapping[str, float]
-_HOUR_S = 3600.0
+class Wave(NamedTuple):
+    """A measure that swings about its mean."""
+
+    mean: float
+    swing: float
+    period_s: float
 
 
-def fertigation_at(wall: float) -> Measures:
-    """Nutrient solution at a time (Unix s): flows in the first third of each hour."""
-    phase = (wall % _HOUR_S) / _HOUR_S
-    swing = math.sin(wall / 400.0)
-    return {
-        "conductivity": round(2.4 + 0.25 * swing, 3),
-        "acidity": round(5.8 + 0.15 * math.cos(wall / 300.0), 2),
-        "flow": 18.5 if phase < 1 / 3 else 0.0,
-    }
-
-
-def osmosis_at(wall: float) -> Measures:
-    """Permeate and pressure: the membrane fouls until its rinse, each two hours."""
-    fouling = (wall % (2 * _HOUR_S)) / (2 * _HOUR_S)
-    return {
-        "permeateConductivity": round(70.0 + 40.0 * fouling, 1),
-        "pressure": round(9.0 + 2.5 * fouling, 2),
-    }
-
-
-EQUIPMENT: Mapping[str, Callable[[float], Measures]] = {
-    "fertigation-1": fertigation_at,
-    "osmosis-1": osmosis_at,
+EQUIPMENT: Mapping[str, Mapping[str, Wave]] = {
+    "fertigation-1": {
+        "conductivity": Wave(2.4, 0.25, 2500.0),
+        "acidity": Wave(5.8, 0.15, 1900.0),
+        "flow": Wave(9.25, 9.25, 3600.0),
+    },
+    "osmosis-1": {
+        "permeateConductivity": Wave(90.0, 20.0, 7200.0),
+        "pressure": Wave(10.25, 1.25, 7200.0),
+    },
 }
-"""By device."""
+"""Measures of other equipment, by device."""
+
+
+def measures_of(device: str, wall: float) -> dict[str, float]:
+    """Values of a device at a time (Unix s)."""
+    return {
+        name: round(mean + swing * math.sin(wall / period_s * math.tau), 3)
+        for name, (mean, swing, period_s) in EQUIPMENT[device].items()
+    }
 
 
 def send_equipment(link: MqttLink, apikey: str, wall: float) -> None:
     """Have each device send what it measures now."""
-    for device, measure in EQUIPMENT.items():
-        payload = orjson.dumps({**measure(wall), "TimeInstant": format_stamp(wall)})
+    for device in EQUIPMENT:
+        measures = measures_of(device, wall)
+        payload = orjson.dumps({**measures, "TimeInstant": format_stamp(wall)})
         link.enqueue(names.measure_topic(apikey, device), payload)
 
 
@@ -231,39 +235,15 @@ class EmulatedRobot:
 _CLIMATE_EVERY_S = 10.0
 
 
-async def run_emulator(
-    world: SimulatedWorld,
-    settings: FleetSettings,
-    *,
-    fault_port: int | None = None,
-    network: Network | None = None,
-) -> None:
-    """Run a world in real time until cancelled.
+class SimulatedFleet:
+    """Robots and people of a run, advanced in real time.
 
     Args:
         world: Robots and people.
         settings: Those of all robots; the directory of the hold files is made if
             missing.
-        fault_port: Loopback port for fault orders; None has none.
         network: DDS: the robots are ROS 2 bases there, controlled by ``iveg robot``;
             topics are below ``/`` and the robot's id in lower case.
-
-    Raises:
-        SettingsError: the fault port is in use.
-    """
-    fleet = SimulatedFleet(world, settings, network)
-    if fault_port is None:
-        await fleet.run()
-        return
-    async with open_fault_port(fault_port, fleet.obey):
-        await fleet.run()
-
-
-class SimulatedFleet:
-    """Robots and people of a run, advanced in real time.
-
-    Args:
-        network: DDS of ROS 2 robots without iVeg's software; None: robots have it.
     """
 
     def __init__(
@@ -286,6 +266,18 @@ class SimulatedFleet:
                 self._robots[robot_id] = Ros2Base(
                     rig, world, network, config, settings.rate_hz
                 )
+
+    async def run_with_faults(self, port: int) -> None:
+        """Run until cancelled, and take fault orders on this port of loopback.
+
+        ``POST /`` with a ``FaultOrder``; 204 when done, 400 when it cannot be read,
+        with a sentence that names the field, 409 when there is no such robot.
+
+        Raises:
+            OSError: the port is in use.
+        """
+        async with post_listener(self._obey, "127.0.0.1", port):
+            await self.run()
 
     async def run(self) -> None:
         """Run until cancelled."""
@@ -314,14 +306,13 @@ class SimulatedFleet:
             tasks.create_task(link.run(), name="climate-link")
             await every(_CLIMATE_EVERY_S, measure)
 
-    def obey(self, order: FaultOrder) -> str | None:
-        """Execute a fault order.
-
-        Returns:
-            None, or the reason why it cannot be done.
-        """
+    def _obey(self, body: bytes) -> tuple[HTTPStatus, str]:
+        try:
+            order = read_order(body)
+        except UnreadableError as error:
+            return HTTPStatus.BAD_REQUEST, str(error)
         robot = self._robots.get(order.robot)
         if robot is None:
-            return f"there is no robot {order.robot}"
+            return HTTPStatus.CONFLICT, f"there is no robot {order.robot}"
         robot.obey(order)
-        return None
+        return HTTPStatus.NO_CONTENT, ""

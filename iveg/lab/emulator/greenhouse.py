@@ -173,11 +173,6 @@ def box_span(rays: Floats, origin: Pose2D, boxes: Floats) -> Span:
     return np.maximum(x[0], y[0]), np.minimum(x[1], y[1])
 
 
-def sides_of(area: Rectangle) -> Floats:
-    """A rectangle as ``box_span`` reads it."""
-    return np.array((area.xmin, area.ymin, area.xmax, area.ymax), float)
-
-
 @dataclass(frozen=True, slots=True)
 class LaserModel:
     """Data sheet of the sensor.
@@ -222,7 +217,9 @@ def sweep(
     """
     angles = sensor.yaw - math.pi + model.angle_increment * np.arange(model.beams)
     directions = np.stack((np.cos(angles), np.sin(angles)))
-    ranges = box_span(directions, sensor, sides_of(scenery.bounds))[1]
+    wall = scenery.bounds
+    sides = np.array((wall.xmin, wall.ymin, wall.xmax, wall.ymax), float)
+    ranges = box_span(directions, sensor, sides)[1]
     crop = box_span(directions, sensor, scenery.rectangles)
     for enter, leave in (crop, *(body.span(directions, sensor) for body in others)):
         hit = np.where((enter <= leave) & (enter >= 0.0), enter, np.inf)

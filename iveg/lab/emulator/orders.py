@@ -1,19 +1,10 @@
-"""Fault orders, at an HTTP endpoint on loopback.
+"""Fault orders to emulated robots."""
 
-``POST /`` with a ``FaultOrder``; 204 when done, 400 when it cannot be read, with a
-sentence that names the field, 409 when it cannot be done.  Not for production: the
-endpoint is on 127.0.0.1 alone, and only on request.
-"""
-
-from collections.abc import AsyncIterator, Callable
-from contextlib import AsyncExitStack, asynccontextmanager
-from http import HTTPStatus
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from iveg.adapters.post_listener import post_listener
-from iveg.domain.errors import SettingsError, UnreadableError
+from iveg.domain.errors import UnreadableError
 from iveg.ngsi.codec.fields import first_complaint
 
 Metres = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -59,35 +50,6 @@ class FaultOrder(_Order):
         """The faults in force after another order; fields that it names count."""
         named = {name: getattr(order, name) for name in order.model_fields_set}
         return self.model_copy(update=named)
-
-
-Obey = Callable[[FaultOrder], str | None]
-"""Executes an order; returns the reason if it cannot."""
-
-
-@asynccontextmanager
-async def open_fault_port(port: int, obey: Obey) -> AsyncIterator[None]:
-    """Accept orders while the block lasts.
-
-    Raises:
-        SettingsError: the port is in use.
-    """
-
-    def answer(body: bytes) -> tuple[HTTPStatus, str]:
-        try:
-            why = obey(read_order(body))
-        except UnreadableError as error:
-            return HTTPStatus.BAD_REQUEST, str(error)
-        return (HTTPStatus.CONFLICT if why else HTTPStatus.NO_CONTENT), why or ""
-
-    async with AsyncExitStack() as stack:
-        listener = post_listener(answer, "127.0.0.1", port)
-        try:
-            await stack.enter_async_context(listener)
-        except OSError as error:
-            allowed = "a port of 127.0.0.1 that nobody listens on"
-            raise SettingsError("fault_port", str(port), allowed) from error
-        yield
 
 
 def read_order(body: bytes) -> FaultOrder:

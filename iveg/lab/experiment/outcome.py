@@ -15,7 +15,6 @@ import platform
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from math import ceil
 from pathlib import Path
 from statistics import fmean
 from typing import Any, Final
@@ -30,6 +29,7 @@ from iveg.lab.experiment.plan import ExperimentPlan, PlannedRun, write_json
 from iveg.lab.experiment.protection import (
     Protection,
     moments_of,
+    p95,
     protection_of,
     total_of,
 )
@@ -193,14 +193,11 @@ def _rows(timed: Sequence[Outcome]) -> Iterator[Json]:
 
 
 def figures(durations_ms: Sequence[float]) -> Json:
-    """Number, mean and 95th percentile (nearest rank) of durations (ms)."""
-    if not durations_ms:
-        return {"count": 0, "mean_ms": None, "p95_ms": None}
-    rank = ceil(0.95 * len(durations_ms))
+    """Number, mean and 95th percentile of durations (ms)."""
     return {
         "count": len(durations_ms),
-        "mean_ms": fmean(durations_ms),
-        "p95_ms": sorted(durations_ms)[rank - 1],
+        "mean_ms": fmean(durations_ms) if durations_ms else None,
+        "p95_ms": p95(durations_ms),
     }
 
 

@@ -138,7 +138,7 @@ class Protection:
             "slowed": {**by_sight, "all": share(slowed, near)},
             "encounters": len(self.delays_s),
             "never_slowed": self.delays_s.count(None),
-            "delay_p95_s": _p95([s for s in self.delays_s if s is not None]),
+            "delay_p95_s": p95([s for s in self.delays_s if s is not None]),
             "needless": share(self.needless_s, self.driven_s),
             "entries": len(self.entries),
             "foretold": share(foretold, len(self.entries)),
@@ -165,7 +165,8 @@ def share(part: float, whole: float) -> float | None:
     return None if whole == 0.0 else round(part / whole, 4)
 
 
-def _p95(values: list[float]) -> float | None:
+def p95(values: Sequence[float]) -> float | None:
+    """95th percentile to three digits; None of nothing."""
     if len(values) < 2:
         return values[0] if values else None
     return round(quantiles(values, n=20, method="inclusive")[-1], 3)

@@ -24,13 +24,7 @@ def write_report(result: Result) -> str:
     style = (css / "tokens.css").read_text("utf-8")
     style += (here / "report.css").read_text("utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined)
-    environment.filters |= {
-        "decimals": _decimals,
-        "percent": _percent,
-        "rate": _rate,
-        "whole": _whole,
-        "yes": _yes,
-    }
+    environment.filters |= {"decimals": _decimals, "percent": _percent}
     template = environment.from_string((here / "report.html").read_text("utf-8"))
     return template.render(
         result=result,
@@ -48,18 +42,6 @@ def _decimals(value: float | None, digits: int = 1) -> str:
 
 def _percent(share: float | None) -> str:
     return "–" if share is None else f"{share:.1%}"
-
-
-def _rate(percent: float) -> str:
-    return f"{percent:.2f} %"
-
-
-def _whole(share: float | None) -> str:
-    return "–" if share is None else f"{share:.0%}"
-
-
-def _yes(is_so: bool) -> str:
-    return "yes" if is_so else "no"
 
 
 def _worst_p95(result: Result) -> float | None:

@@ -311,7 +311,6 @@ class VirtualRun:
         greenhouse = load_greenhouse(scenario.greenhouse)
         layout = lay_out(scenario, ROBOTS, greenhouse)
         self._result = VirtualRecording()
-        self._looks: list[Row] = []
         by_paper = step.rule == "paper"
         if by_paper:
             rule = replace(rule, possible_people=False, foresight=False)
@@ -341,17 +340,15 @@ class VirtualRun:
         return self._result
 
     def _looked(self, rig: RobotHardware) -> None:
-        """The truth at the moment of the picture."""
+        """Keep the truth at the moment of the picture."""
         driving = self._stage.robots[rig.robot_id].driving
         now = self._iveg.now.mono
-        self._looks.append(true_picture(rig, self._world, now, driving))
+        self._result.truth.append(true_picture(rig, self._world, now, driving))
 
     def _report(self) -> None:
-        """Keep what iVeg reports for the frames of this step, beside the truth."""
-        looks, self._looks = self._looks, []
-        for row in looks:
+        """Keep what iVeg reports for the pictures of this step, beside the truth."""
+        for row in self._result.truth[len(self._result.reported) :]:
             frame = self._views.frame(row["robot"], self._iveg.now)
-            self._result.truth.append(row)
             self._result.foretold.append(foretold_row(self._iveg, row))
             self._result.reported.append(
                 picture_of(frame.model_dump(mode="json"), row["at"])

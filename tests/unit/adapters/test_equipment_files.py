@@ -2,7 +2,7 @@ import pytest
 
 from iveg.adapters.equipment_files import DEMO, load_equipment, read_equipment
 from iveg.domain.errors import DataFileError
-from iveg.lab.emulator.fleet import EQUIPMENT
+from iveg.lab.emulator.fleet import measures_of
 
 ONE = """\
 [[tiles]]
@@ -82,5 +82,5 @@ def test_tiles_that_contradict_each_other_are_refused(text: str, said: str) -> N
 
 def test_the_emulator_measures_each_tile_of_the_demo() -> None:
     for tile in load_equipment(DEMO):
-        value = EQUIPMENT[tile.device](1_795_000_000.0)[tile.attribute]
+        value = measures_of(tile.device, 1_795_000_000.0)[tile.attribute]
         assert tile.limits.get("low", value) <= value <= tile.limits.get("high", value)

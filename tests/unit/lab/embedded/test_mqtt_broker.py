@@ -212,13 +212,3 @@ async def test_the_newest_client_of_an_identifier_stays(broker: MqttBroker) -> N
         assert await answered(first, 1) == b""
         writer.write(PINGREQ)
         assert await answered(second, 2) == PINGRESP
-
-
-async def test_a_measure_that_is_to_be_confirmed_is_heard_and_confirmed(
-    broker: MqttBroker,
-) -> None:
-    heard = Heard(broker)
-    async with line(broker) as (reader, writer):
-        writer.write(b"\x32\x08\x00\x01a\x01\x02xyz")
-        assert await answered(reader, 4) == b"\x40\x02\x01\x02"
-        assert heard.messages == [("a", b"xyz")]

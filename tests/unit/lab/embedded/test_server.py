@@ -9,8 +9,7 @@ import httpx
 import pytest
 
 from iveg.domain.errors import SettingsError
-from iveg.lab.embedded.server import embedded_fiware, serve_fiware
-from tests.ports import free_ports
+from iveg.lab.embedded.server import embedded_fiware
 
 LOOPBACK = ("127.0.0.1", 0)
 ELSEWHERE = ("0.0.0.0", 0)  # noqa: S104 - refused, which is the point
@@ -43,26 +42,6 @@ async def test_a_taken_port_is_an_os_error_and_leaves_nothing(
         async with embedded_fiware(*addresses):
             pass
     server.close()
-    assert not [one for one in caplog.records if one.levelno >= logging.WARNING]
-
-
-async def test_serving_says_when_it_is_ready_and_ends_when_cancelled(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    ready = asyncio.Event()
-    mqtt, orion, iota = (("127.0.0.1", port) for port in free_ports(3))
-    serving = asyncio.create_task(
-        serve_fiware(mqtt, orion, iota, notify_ready=ready.set)
-    )
-    async with asyncio.timeout(30):
-        await ready.wait()
-    async with httpx.AsyncClient() as http:
-        told = await http.get(f"http://127.0.0.1:{orion[1]}/version")
-    serving.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await serving
-    gc.collect()
-    assert told.status_code == 200
     assert not [one for one in caplog.records if one.levelno >= logging.WARNING]
 
 
