@@ -54,7 +54,7 @@ def _read_safe_address(url: str) -> str:
 def _read_roles(text: str) -> tuple[str, ...]:
     rows = tuple(row.strip() for row in text.split(","))
     read = [split_role(row) for row in rows]
-    if None in read or len({one[0] for one in read if one}) != len(rows):
+    if None in read or len({found[0] for found in read if found}) != len(rows):
         raise ValueError(text)
     return rows
 
@@ -62,7 +62,9 @@ def _read_roles(text: str) -> tuple[str, ...]:
 def split_role(row: str) -> tuple[str, PersonRole] | None:
     """Value of a claim and the role that it gives; None: neither is told."""
     value, _, word = row.rpartition("=")
-    role = next((one for one in get_args(PersonRole) if one == word.strip()), None)
+    role = next(
+        (known for known in get_args(PersonRole) if known == word.strip()), None
+    )
     return (value.strip(), role) if role and value.strip() else None
 
 
@@ -170,8 +172,8 @@ def rule_value(row: Parameter) -> Any:
     def read(text: str) -> ByClass:
         every, *others = text.split(",")
         by_class = {}
-        for one in others:
-            class_, _, value = one.partition("=")
+        for other in others:
+            class_, _, value = other.partition("=")
             own = next((own for own in CLASSES if own == class_.strip()), None)
             if own is None:
                 raise ValueError(text)
@@ -179,7 +181,7 @@ def rule_value(row: Parameter) -> Any:
         found = ByClass(float(every), by_class)
         if len(by_class) < len(others):
             raise ValueError(text)
-        if not all(row.least <= one <= row.most for one in found.values):
+        if not all(row.least <= value <= row.most for value in found.values):
             raise ValueError(text)
         return found
 

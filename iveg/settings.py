@@ -412,7 +412,7 @@ class Settings:
     @property
     def sso_role_map(self) -> dict[str, PersonRole]:
         """Value of the provider's claim → the role that it gives."""
-        return dict(row for one in self.sso_roles if (row := split_role(one)))
+        return dict(row for text in self.sso_roles if (row := split_role(text)))
 
     @property
     def limits_of_recordings(self) -> tuple[RecordingLimits, RecordingLimits]:
@@ -475,14 +475,16 @@ class _Row:
 def _rows() -> Iterator[_Row]:
     """Every setting; those of the rule stand where the table has the rule."""
     hints = get_type_hints(Settings, include_extras=True)
-    for one in fields(Settings):
-        if one.name == "rule":
+    for field_ in fields(Settings):
+        if field_.name == "rule":
             for row in PARAMETERS:
                 type_, default = rule_value(row), row.default
                 yield _Row(row.variable, row.name, type_, default, row.says, True)
         else:
-            variable, help_ = one.metadata["variable"], one.metadata["help"]
-            yield _Row(variable, one.name, hints[one.name], one.default, help_)
+            name, about = field_.name, field_.metadata
+            yield _Row(
+                about["variable"], name, hints[name], field_.default, about["help"]
+            )
 
 
 def _read(row: _Row, text: str) -> Any:

@@ -45,7 +45,7 @@ def read_equipment(
         DataFileError: naming file, key and reason.
     """
     page = read_table(text, file, _FileTable)
-    tiles = tuple(one.value() for one in page.tiles)
+    tiles = tuple(row.value() for row in page.tiles)
     wrong = contradiction(tiles) or _taken(tiles, robots)
     if wrong is not None:
         index, key, reason = wrong

@@ -50,8 +50,8 @@ def load_fleet(file: str = "", words: Sequence[str] = ()) -> FleetDescription:
     robots = []
     for word in words:
         name, kind = split_word(word) or (word, None)
-        one = known.members.get(name) or built_in().of_robot(name)
-        robots.append(one if kind is None else replace(one, kind=kind))
+        robot = known.members.get(name) or built_in().of_robot(name)
+        robots.append(robot if kind is None else replace(robot, kind=kind))
     return FleetDescription.of(robots)
 
 
@@ -68,8 +68,8 @@ def read_fleet(text: str, file: str) -> FleetDescription:
         DataFileError: naming file, key and reason.
     """
     page = read_table(text, file, _FileTable)
-    robots = [one.value() for one in page.robots]
-    names = [one.robot_id for one in robots]
+    robots = [row.value() for row in page.robots]
+    names = [robot.robot_id for robot in robots]
     for index, name in enumerate(names):
         if name in names[:index]:
             reason = f"{name} is in the list twice"

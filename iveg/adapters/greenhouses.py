@@ -50,11 +50,11 @@ def read_greenhouse(text: str, file: str) -> Greenhouse:
     return Greenhouse(
         page.name,
         bounds,
-        tuple(DriveLane(one.label, one.area()) for one in page.lanes),
-        tuple(one.area() for one in page.rows),
-        tuple(StructuralPost(one.x, one.y, one.radius) for one in page.posts),
-        tuple(PlacedObstacle(one.kind, one.area()) for one in page.obstacles),
-        tuple(Pose2D(one.x, one.y, one.yaw) for one in page.starts),
+        tuple(DriveLane(lane.label, lane.area()) for lane in page.lanes),
+        tuple(row.area() for row in page.rows),
+        tuple(StructuralPost(post.x, post.y, post.radius) for post in page.posts),
+        tuple(PlacedObstacle(row.kind, row.area()) for row in page.obstacles),
+        tuple(Pose2D(start.x, start.y, start.yaw) for start in page.starts),
         page.outside_m,
     )
 

@@ -51,10 +51,10 @@ def load_messages(file: str) -> MessagePlan:
     page = read_table(text, file, _FileTable)
     found = []
     for key, rows in (("address", page.address), ("escalation", page.escalation)):
-        for index, one in enumerate(rows):
-            if _opened(one.url) is None:
+        for index, row in enumerate(rows):
+            if _opened(row.url) is None:
                 raise complaint(file, (key, index, "url"), "is not one of apprise")
-            found.append(Address(one.name, one.url, one.least, key == "escalation"))
+            found.append(Address(row.name, row.url, row.least, key == "escalation"))
     return MessagePlan(tuple(found), page.escalate_after_min * 60, page.language)
 
 

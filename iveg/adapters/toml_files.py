@@ -64,6 +64,6 @@ def read_table(text: str, file: str, shape: type[T]) -> T:
 
 def complaint(file: str, path: KeyPath, reason: str) -> DataFileError:
     """The error that one key of a file is wrong."""
-    key = "".join(f"[{one}]" if isinstance(one, int) else f".{one}" for one in path)
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
     said = reason.removeprefix("Value error, ")
     return DataFileError(file, key.lstrip("."), f"{said}.")

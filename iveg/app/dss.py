@@ -299,8 +299,8 @@ class Dss:
             parts = self.pipeline.commander, self.pipeline.goals, self.outside
             for part in parts:
                 await part.close()
-            for one in (self.worker, self.packer, self.accounts):
-                one.close()
+            for closed in (self.worker, self.packer, self.accounts):
+                closed.close()
 
     async def _live(self) -> None:
         self.pipeline.commander.restore(self.stores.journal.read(), clock.now())
@@ -452,7 +452,7 @@ async def remember(history: Queries, parts: Pipeline) -> None:
         parts.commander.close_earlier(left_open, now)
         parts.goals.close_earlier(left_open, now)
         parts.evaluator.close_earlier(decisions, alerted, now)
-        parts.evaluator.alerts.remember(read_alert(one, now) for one in unseen)
+        parts.evaluator.alerts.remember(read_alert(row, now) for row in unseen)
         parts.core.event_log.recall(lines)
         parts.core.health_monitor.earlier_read = True
         return

@@ -61,7 +61,7 @@ def main(arguments: Sequence[str]) -> int:
 
 def _warn_of_gone(environment: Mapping[str, str]) -> None:
     """Name settings that no version has any more, in one warning."""
-    gone = sorted(one for one in GONE if environment.get(one))
+    gone = sorted(name for name in GONE if environment.get(name))
     if gone:
         _log.warning("%s: no longer a setting (docs/upgrading.md)", ", ".join(gone))
 

@@ -99,17 +99,17 @@ def add_user(user: argparse.ArgumentParser) -> None:
         "token": "a program's token, printed once",
         "revoke": "end a program's token",
     }.items():
-        one = actions.add_parser(action, help=says)
-        one.add_argument("name", metavar="NAME")
+        words = actions.add_parser(action, help=says)
+        words.add_argument("name", metavar="NAME")
         if action in ("add", "role"):
             roles = ("viewer", "operator", "admin")
-            one.add_argument("--role", choices=roles, required=True)
+            words.add_argument("--role", choices=roles, required=True)
         if action == "token":
             scopes = ("read", "stop", "operate")
-            one.add_argument("--scope", choices=scopes, required=True)
+            words.add_argument("--scope", choices=scopes, required=True)
         if action in ("add", "token"):
             ends = "how long it is good for"
-            one.add_argument("--days", type=int, metavar="N", help=ends)
+            words.add_argument("--days", type=int, metavar="N", help=ends)
 
 
 def add_replay(replay: argparse.ArgumentParser) -> None:

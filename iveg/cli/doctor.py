@@ -166,16 +166,16 @@ class _Path:
         """Whether Orion has this probe, or a later one of a running iVeg."""
         read = codec.read_entity(await self.orion.read_probe() or {})
         return any(
-            isinstance(one, HeartbeatProbe) and (one.origin.stamp or "") >= stamp
-            for one in read.observations
+            isinstance(found, HeartbeatProbe) and (found.origin.stamp or "") >= stamp
+            for found in read.observations
         )
 
     async def look_at_subscriptions(self) -> None:
         """Read at Orion whether iVeg's subscriptions are there and deliver."""
         ours = [
-            one
-            for one in await self.orion.read_subscriptions()
-            if str(one.get("description", "")).startswith(PREFIX)
+            subscription
+            for subscription in await self.orion.read_subscriptions()
+            if str(subscription.get("description", "")).startswith(PREFIX)
         ]
         if failing := describe_failures(ours):
             raise HopError(Hop.NOTIFICATIONS, failing)

@@ -38,7 +38,7 @@ class EquipmentMonitor:
     def tick(self, now: Instant) -> None:
         """Let time pass: what is silent or beyond a limit becomes an alert."""
         self._supervision.report(PART, self.equipment.conditions(now))
-        states = tuple(self.equipment.state(one, now) for one in self.equipment.tiles)
+        states = tuple(self.equipment.state(tile, now) for tile in self.equipment.tiles)
         if states != self._states:
             self._states = states
             self._event_log.changed(topics.EQUIPMENT.name)

@@ -74,7 +74,7 @@ class Messenger:
         pace: Pace = Pace(),
     ) -> None:
         self.counters: Counter[str] = Counter()
-        self._lines = [_Line(one) for one in plan.addresses]
+        self._lines = [_Line(address) for address in plan.addresses]
         self._escalate_after_s = plan.escalate_after_s
         self._send_message, self._write = send, write
         self._alerts, self._clock, self._pace = alerts, core.ports.clock, pace
@@ -91,7 +91,9 @@ class Messenger:
     def escalate(self) -> None:
         """Queue for the second list whatever nobody has acknowledged for too long."""
         now = self._clock().mono
-        unseen = {one.alert_id: one for one in self._alerts.waiting if one.unseen}
+        unseen = {
+            alert.alert_id: alert for alert in self._alerts.waiting if alert.unseen
+        }
         self._since = {name: self._since.get(name, now) for name in unseen}
         self._escalated &= unseen.keys()
         for name, since in self._since.items():
@@ -138,7 +140,7 @@ class Messenger:
             self._failed(to, failed)
             return False
         self.counters["messages.sent"] += 1
-        self._logged = {one for one in self._logged if one[0] != to.name}
+        self._logged = {(name, why) for name, why in self._logged if name != to.name}
         return True
 
     async def _send(self, to: Address, items: Sequence[AlertItem]) -> str | None:

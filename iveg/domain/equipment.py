@@ -101,12 +101,12 @@ class Equipment:
     def __init__(self, tiles: Sequence[Tile], start: Instant) -> None:
         self.tiles = tuple(tiles)
         self._start = start
-        self._status = {one.key: TileStatus() for one in tiles}
+        self._status = {tile.key: TileStatus() for tile in tiles}
 
     @property
     def entities(self) -> Container[tuple[str, str]]:
         """Id and type of each entity that a tile is about."""
-        return frozenset((one.entity_id, one.entity_type) for one in self.tiles)
+        return frozenset((tile.entity_id, tile.entity_type) for tile in self.tiles)
 
     def status(self, tile: Tile) -> TileStatus:
         """Newest knowledge of a tile."""

@@ -110,7 +110,7 @@ class FleetDescription:
     @classmethod
     def of(cls, robots: Iterable[RobotDescription]) -> "FleetDescription":
         """The fleet of these robots."""
-        return cls({one.robot_id: one for one in robots})
+        return cls({robot.robot_id: robot for robot in robots})
 
     @classmethod
     def undescribed(cls, robot_ids: Iterable[str]) -> "FleetDescription":

@@ -62,7 +62,7 @@ def plain(word: str) -> str:
     folded = unicodedata.normalize(
         "NFKD", unicodedata.normalize("NFKC", word).casefold()
     )
-    letters = "".join(one for one in folded if not unicodedata.combining(one))
+    letters = "".join(c for c in folded if not unicodedata.combining(c))
     parts = [part.strip("0123456789") for part in _APART.split(letters)]
     kept = [part for part in parts if part and not part.isnumeric()]
     if len(kept) == 1 and kept[0] in _NUMBERED and any(map(str.isnumeric, letters)):
@@ -91,7 +91,7 @@ def read_classes(text: str) -> tuple[str, ...]:
     names: list[str] = []
     for number, line in enumerate(text.rstrip().splitlines()):
         names.append(_class_in(line.strip(), number))
-        if names[-1].casefold() in {one.casefold() for one in names[:-1]}:
+        if names[-1].casefold() in {name.casefold() for name in names[:-1]}:
             raise UnreadableError(f"line {number + 1}", "a name that stands above, too")
     return tuple(names)
 
@@ -109,20 +109,21 @@ def _class_in(line: str, number: int) -> str:
 
 def name_numbers(frame: DetectionFrame, classes: Sequence[str]) -> DetectionFrame:
     """The frame with words for numbers; a box without a word counts as unread."""
-    if all(plain(one.class_id) for one in frame.detections) and all(
-        one is None or plain(one) for one in frame.unread
+    detections = frame.detections
+    if all(plain(detection.class_id) for detection in detections) and all(
+        word is None or plain(word) for word in frame.unread
     ):
         return frame
-    named = [(one, _named(one.class_id, classes)) for one in frame.detections]
+    named = [(found, _named(found.class_id, classes)) for found in detections]
     return replace(
         frame,
         detections=tuple(
-            one if one.class_id == word else replace(one, class_id=word)
-            for one, word in named
+            found if found.class_id == word else replace(found, class_id=word)
+            for found, word in named
             if word is not None
         ),
         unread=(
-            *(one and _named(one, classes) for one in frame.unread),
+            *(word and _named(word, classes) for word in frame.unread),
             *(None for _, word in named if word is None),
         ),
     )
@@ -196,7 +197,7 @@ class WordAnswers:
     def persons(self, detector: str) -> list[str]:
         """Words of a detector that stand for a person by an operator's word."""
         return [
-            one.word
-            for one in self.known.values()
-            if one.is_person and one.detector == detector
+            answer.word
+            for answer in self.known.values()
+            if answer.is_person and answer.detector == detector
         ]

@@ -5,6 +5,7 @@ What cannot be read becomes an ``UnreadPart`` beside what can.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, TypeVar, get_type_hints
 
 import orjson
@@ -102,9 +103,9 @@ def merge(readings: Iterable[ReadResult]) -> ReadResult:
     """Several readings as one, in order."""
     readings = tuple(readings)
     return ReadResult(
-        tuple(one for reading in readings for one in reading.observations),
-        tuple(one for reading in readings for one in reading.problems),
-        tuple(one for reading in readings for one in reading.equipment),
+        tuple(chain.from_iterable(reading.observations for reading in readings)),
+        tuple(chain.from_iterable(reading.problems for reading in readings)),
+        tuple(chain.from_iterable(reading.equipment for reading in readings)),
     )
 
 
@@ -224,5 +225,5 @@ def write_origin(origin: Origin) -> dict[str, object]:
     return fields
 
 
-def _write_ref(heard: FeedbackRef | None) -> dict[str, object] | None:
-    return None if heard is None else {"boot": heard.boot, "seq": heard.seq}
+def _write_ref(ref: FeedbackRef | None) -> dict[str, object] | None:
+    return None if ref is None else {"boot": ref.boot, "seq": ref.seq}

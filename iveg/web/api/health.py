@@ -72,35 +72,35 @@ def _families(health: Health, watch: LatencyWatch, queues: Queues) -> list[Metri
                 "hop_up",
                 "1 while the hop works, else 0.",
                 "hop",
-                {one.hop: one.state == "ok" for one in hops},
+                {hop.hop: hop.state == "ok" for hop in hops},
             ),
             (
                 "gauge",
                 "lag_seconds",
                 "Lag of the heartbeat probe at the hop.",
                 "hop",
-                {one.hop: one.lag_s for one in hops},
+                {hop.hop: hop.lag_s for hop in hops},
             ),
             (
                 "gauge",
                 "lag_growing",
                 "1 while that lag grows, else 0.",
                 "hop",
-                {one.hop: one.growing for one in hops if one.lag_s is not None},
+                {hop.hop: hop.growing for hop in hops if hop.lag_s is not None},
             ),
             (
                 "gauge",
                 "clock_offset_seconds",
                 "Clock of the robot minus clock of the server.",
                 "robot",
-                {robot: one.offset_s for robot, one in clocks.items()},
+                {robot: clock.offset_s for robot, clock in clocks.items()},
             ),
             (
                 "gauge",
                 "clock_uncertainty_seconds",
                 "Greatest error of that offset.",
                 "robot",
-                {robot: one.uncertainty_s for robot, one in clocks.items()},
+                {robot: clock.uncertainty_s for robot, clock in clocks.items()},
             ),
             ("gauge", "queue_depth", "Items in the queue.", "queue", queues.depths),
             ("counter", "dropped", "Items dropped.", "queue", queues.dropped),
@@ -163,9 +163,14 @@ def router(
         now = clock()
         families = _families(health(now), watch, queues())
         latency: _Latency = [
-            ((one.robot_id, one.data, hop), part.count, part.total, part.parts("1min"))
-            for one in watch.streams
-            for hop, part in one.segments.items()
+            (
+                (stream.robot_id, stream.data, hop),
+                part.count,
+                part.total,
+                part.parts("1min"),
+            )
+            for stream in watch.streams
+            for hop, part in stream.segments.items()
             if part.count
         ]
         # Twenty robots have 300 sketches to sum up: beside the loop, not in it.
