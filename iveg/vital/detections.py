@@ -90,7 +90,6 @@ class DetectionTracking:
         self.other: dict[str, Instant] = {}
         self.newest = NewestDetections()
         self._world, self._people = core.world, core.people
-        self._greenhouse = core.greenhouse
         self._own_sight = OwnSight(core.greenhouse)
         self._blind = BlindCameras(core.greenhouse)
         self._event_log, self._new_id = core.event_log, core.ports.new_id
@@ -151,8 +150,8 @@ class DetectionTracking:
         look = Look.of_frame(robot, frame, placed, at)
         if robot.description.has_detector and not robot.is_replay:
             self._blind.take(look, self._people, self._world)
-        for person in self._own_sight.take(look, self._people):
-            self._log_clear(person, at)
+        if self._own_sight.take(look, self._people):
+            self._event_log.changed(topics.PEOPLE.name)
 
     def _hear_words(
         self, frame: DetectionFrame, name: str, rule: DetectionRule
@@ -239,17 +238,6 @@ class DetectionTracking:
             if one.first_seen == at:
                 self._event_log.log(_walker_line(one, report.robot_id), at)
         return one is not None
-
-    def _log_clear(self, person: TrackedPerson, now: Instant) -> None:
-        self._event_log.changed(topics.PEOPLE.name)
-        newest = person.newest
-        if person.sightings or person.stage(now) == "seen":
-            return
-        lane = self._greenhouse.lane_at(newest.x, newest.y) or ""
-        slots = {"person": person.person_id, "lane": lane}
-        self._event_log.log(
-            LogEvent("detection", "log.person_cleared", slots, None, person.class_), now
-        )
 
     def forget(self, now: Instant) -> None:
         """Forget subjects who are gone."""
