@@ -29,7 +29,9 @@ class Alerting:
 
     def remember(self, earlier: Iterable[BookedAlert]) -> None:
         """Take up unacknowledged alerts of an earlier run."""
-        self._book.remember(one for one in earlier if not self.knows(one.alert_id))
+        self._book.remember(
+            alert for alert in earlier if not self.knows(alert.alert_id)
+        )
         self._event_log.changed(topics.ALERTS.name)
 
     def sync(self, wrong: Iterable[Condition], now: Instant) -> None:
@@ -42,7 +44,7 @@ class Alerting:
             if alert.condition.robot_id is not None:
                 # A P1 is part of its situation.
                 self._event_log.changed(topics.ROBOT.of(alert.condition.robot_id))
-        raised = [one for one in changed if one.cleared is None]
+        raised = [alert for alert in changed if alert.cleared is None]
         if raised:
             self._tell("raised", raised)
 
@@ -63,11 +65,13 @@ class Alerting:
 
         Each P1 is about somebody in danger: it sounds until it was read by itself.
         """
-        found = (self._book.find(one) for one in alert_ids)
+        found = (self._book.find(alert_id) for alert_id in alert_ids)
         lesser = [
-            one.alert_id
-            for one in found
-            if one is not None and one.priority != "P1" and not one.last.acknowledged
+            alert.alert_id
+            for alert in found
+            if alert is not None
+            and alert.priority != "P1"
+            and not alert.last.acknowledged
         ]
-        seen = (self.acknowledge(one, by, note, now) for one in lesser)
-        return [one for one in seen if one is not None]
+        seen = (self.acknowledge(alert_id, by, note, now) for alert_id in lesser)
+        return [alert for alert in seen if alert is not None]

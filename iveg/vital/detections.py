@@ -53,7 +53,7 @@ class JudgedDetection(NamedTuple):
     Making every row at once would cost the rule loop what nobody may ask for.
     """
 
-    one: Placed
+    found: Placed
     frame: DetectionFrame
     received: Received
 
@@ -64,16 +64,16 @@ class NewestDetections:
     def __init__(self) -> None:
         self._newest: deque[JudgedDetection] = deque(maxlen=MOST_DETECTIONS)
 
-    def note(self, one: Placed, frame: DetectionFrame, received: Received) -> None:
+    def note(self, found: Placed, frame: DetectionFrame, received: Received) -> None:
         """Remember one detection."""
-        self._newest.append(JudgedDetection(one, frame, received))
+        self._newest.append(JudgedDetection(found, frame, received))
 
     def rows(
         self, admits: Callable[[JudgedDetection], bool], most: int
     ) -> tuple[DetectionRecord, ...]:
         """At most so many of those that are admitted, newest first."""
         admitted = filter(admits, reversed(self._newest))
-        return tuple(detection_of(*one) for one in islice(admitted, most))
+        return tuple(detection_of(*judged) for judged in islice(admitted, most))
 
 
 class DetectionTracking:
@@ -90,7 +90,6 @@ class DetectionTracking:
         self.other: dict[str, Instant] = {}
         self.newest = NewestDetections()
         self._world, self._people = core.world, core.people
-        self._greenhouse = core.greenhouse
         self._own_sight = OwnSight(core.greenhouse)
         self._blind = BlindCameras(core.greenhouse)
         self._event_log, self._new_id = core.event_log, core.ports.new_id
@@ -151,8 +150,8 @@ class DetectionTracking:
         look = Look.of_frame(robot, frame, placed, at)
         if robot.description.has_detector and not robot.is_replay:
             self._blind.take(look, self._people, self._world)
-        for person in self._own_sight.take(look, self._people):
-            self._log_clear(person, at)
+        if self._own_sight.take(look, self._people):
+            self._event_log.changed(topics.PEOPLE.name)
 
     def _hear_words(
         self, frame: DetectionFrame, name: str, rule: DetectionRule
@@ -169,9 +168,12 @@ class DetectionTracking:
                 or answers.is_person(name, word) is not None
             )
 
-        lists_people = any(rule.class_of(one) == "person" for one in listed)
-        said = [(one.class_id, one.probability) for one in frame.detections]
-        said += [(one, 1.0) for one in frame.unread if one is not None]
+        lists_people = any(rule.class_of(word) == "person" for word in listed)
+        said = [
+            (detection.class_id, detection.probability)
+            for detection in frame.detections
+        ]
+        said += [(word, 1.0) for word in frame.unread if word is not None]
         heard = robot.detector.words_of(name)
         heard.hear(
             [lists_people, *(is_known(word) for word, _ in said)],
@@ -195,9 +197,9 @@ class DetectionTracking:
         placed = self._people.sight(frame, self._world, rule, seen_at, self._new_id())
         for name in self._people.unknown_frames:
             self._name_unknown_frame(frame.robot_id, name, received.at)
-        for one in placed:
-            self._describe(one, frame, received)
-        if any(one.person is not None for one in placed):
+        for found in placed:
+            self._describe(found, frame, received)
+        if any(found.person is not None for found in placed):
             self._event_log.changed(topics.PEOPLE.name)
         return placed
 
@@ -213,43 +215,34 @@ class DetectionTracking:
             LogEvent("detection", "log.unknown_frame", slots, robot_id), at
         )
 
-    def _describe(self, one: Placed, frame: DetectionFrame, received: Received) -> None:
+    def _describe(
+        self, found: Placed, frame: DetectionFrame, received: Received
+    ) -> None:
         """Remember a detection, and keep and log it as often as it is worth."""
         at, robot_id = received.at, frame.robot_id
-        self.newest.note(one, frame, received)
-        if one.kind == "other":
+        self.newest.note(found, frame, received)
+        if found.kind == "other":
             self.other[robot_id] = at
-        subject = robot_id, _name_of(one)
+        subject = robot_id, _name_of(found)
         since_s = at.mono - self._kept_at.get(subject, -inf)
         if since_s < _KEPT_EVERY_S:
             return
         self._kept_at[subject] = at.mono
-        self._event_log.detection(one, frame, received)
+        self._event_log.detection(found, frame, received)
         if since_s >= _NEW_AFTER_S:
-            self._event_log.log(_line(one, *subject), at)
+            self._event_log.log(_line(found, *subject), at)
 
     def witness(self, report: SafetyReport, at: Instant) -> bool:
         """Track who walks near a robot of today by its own laser; whether one does."""
         if report.obstacle is None or self._world.robot(report.robot_id).is_replay:
             return False
-        one = self._people.witness(report, at, self._new_id())
+        walker = self._people.witness(report, at, self._new_id())
         self._tell("obstacle_reported", report, at)
-        if one is not None:
+        if walker is not None:
             self._event_log.changed(topics.PEOPLE.name)
-            if one.first_seen == at:
-                self._event_log.log(_walker_line(one, report.robot_id), at)
-        return one is not None
-
-    def _log_clear(self, person: TrackedPerson, now: Instant) -> None:
-        self._event_log.changed(topics.PEOPLE.name)
-        newest = person.newest
-        if person.sightings or person.stage(now) == "seen":
-            return
-        lane = self._greenhouse.lane_at(newest.x, newest.y) or ""
-        slots = {"person": person.person_id, "lane": lane}
-        self._event_log.log(
-            LogEvent("detection", "log.person_cleared", slots, None, person.class_), now
-        )
+            if walker.first_seen == at:
+                self._event_log.log(_walker_line(walker, report.robot_id), at)
+        return walker is not None
 
     def forget(self, now: Instant) -> None:
         """Forget subjects who are gone."""
@@ -262,34 +255,34 @@ class DetectionTracking:
             del self._kept_at[subject]
 
 
-def _name_of(one: Placed) -> str:
+def _name_of(found: Placed) -> str:
     """The subject of a detection: a peer, a person, or all that is judged alike."""
-    if one.person is not None:
-        return one.person.person_id
-    return one.peer or f"{one.kind}:{one.class_ or ''}"
+    if found.person is not None:
+        return found.person.person_id
+    return found.peer or f"{found.kind}:{found.class_ or ''}"
 
 
-def _walker_line(one: TrackedPerson, robot_id: str) -> LogEvent:
-    place = {"x": round(one.newest.x, 2), "y": round(one.newest.y, 2)}
-    slots: dict[str, Slot] = {"robot": robot_id, "person": one.person_id, **place}
-    return LogEvent("detection", "log.walker", slots, robot_id, one.class_)
+def _walker_line(walker: TrackedPerson, robot_id: str) -> LogEvent:
+    place = {"x": round(walker.newest.x, 2), "y": round(walker.newest.y, 2)}
+    slots: dict[str, Slot] = {"robot": robot_id, "person": walker.person_id, **place}
+    return LogEvent("detection", "log.walker", slots, robot_id, walker.class_)
 
 
-def _line(one: Placed, robot_id: str, subject: str) -> LogEvent:
-    x, y, _ = one.position
+def _line(found: Placed, robot_id: str, subject: str) -> LogEvent:
+    x, y, _ = found.position
     slots: dict[str, Slot] = {
         "robot": robot_id,
-        "class": one.class_ or one.detection.class_id,
-        "class_id": one.detection.class_id,
-        "confidence": one.detection.probability,
+        "class": found.class_ or found.detection.class_id,
+        "class_id": found.detection.class_id,
+        "confidence": found.detection.probability,
         "x": round(x, 2),
         "y": round(y, 2),
         "person": subject,
     }
-    key, looks = _KEYS[one.kind], one.looks
-    if one.doubtful is not None:
+    key, looks = _KEYS[found.kind], found.looks
+    if found.doubtful is not None:
         key = "log.detection_doubtful"
-    elif one.possible and looks is not None:
+    elif found.possible and looks is not None:
         key = "log.detection_possible"
         slots |= {
             "looks": looks.count,
@@ -298,4 +291,4 @@ def _line(one: Placed, robot_id: str, subject: str) -> LogEvent:
             "over": looks.over_s,
             "probability": round(looks.probability, 4),
         }
-    return LogEvent("detection", key, slots, robot_id, one.class_)
+    return LogEvent("detection", key, slots, robot_id, found.class_)

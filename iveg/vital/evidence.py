@@ -127,10 +127,12 @@ def cause_of(report: SafetyReport, decisions: Decisions) -> ZoneEntry | None:
     decision = decisions.get(named or "")
     if decision is not None:
         return decision.entry
-    ours = (
-        one.entry for one in decisions.open if one.entry.robot_id == report.robot_id
-    )
-    return next((one for one in ours if one.zone.alert_id == named), None)
+    for one in decisions.open:
+        zone = one.entry.zone
+        is_named = zone.cause == report.cause or (named and zone.alert_id == named)
+        if is_named and one.entry.robot_id == report.robot_id:
+            return one.entry
+    return None
 
 
 def _first_of(

@@ -208,7 +208,10 @@ class Event:
         kind = _ORDERS.get(self.key, "stop")
         is_stop = kind == "stop"
         plain = not is_stop or self.key in ("requested", "adopted")
-        ways = {one.id: "pending" if one.carries(kind) else "off" for one in transports}
+        ways = {
+            transport.id: "pending" if transport.carries(kind) else "off"
+            for transport in transports
+        }
         return FollowedCommand(
             self.new_id,
             robot_id,
@@ -321,8 +324,8 @@ class Sends:
     """
 
     def __init__(self, transports: Iterable[Transport]) -> None:
-        self._ways = {one.id: one for one in transports if one.can_stop}
-        self._is_alone = all(one.one_at_a_time for one in self._ways.values())
+        self._ways = {way.id: way for way in transports if way.can_stop}
+        self._is_alone = all(way.one_at_a_time for way in self._ways.values())
         self._sent: dict[TransportId, tuple[float, float]] = {}
         """When a STOP was last sent (monotonic, s), and how old it was then (s)."""
         self._busy: set[TransportId] = set()
@@ -403,7 +406,7 @@ class StopStatus:
         self.stop: FollowedCommand | None = None
         self.attempt: Attempt | None = None
         self.evidence = StopEvidence(robot_id)
-        self._transports = {one.id: one for one in transports}
+        self._transports = {way.id: way for way in transports}
         self._sends = Sends(self._transports.values())
         self._joined_at = self._begun_at = -inf
         self._deadline = 0.0
@@ -430,10 +433,14 @@ class StopStatus:
     @property
     def commands(self) -> tuple[FollowedCommand, ...]:
         """The STOP, and the release or resume under way, as they are now."""
-        return tuple(one for one in (self.stop, self.once) if one is not None)
+        return tuple(
+            command for command in (self.stop, self.once) if command is not None
+        )
 
     def _find(self, command_id: str) -> FollowedCommand | None:
-        found = (one for one in self.commands if one.command_id == command_id)
+        found = (
+            command for command in self.commands if command.command_id == command_id
+        )
         return next(found, None)
 
     def _keep(self, command: FollowedCommand) -> None:
@@ -483,4 +490,4 @@ class StopStatus:
 
     def _closed_by(self, key: Key) -> list[Closed]:
         """Effects that close the commands of the ended episode."""
-        return [Closed(one.ended(key), key) for one in reversed(self.commands)]
+        return [Closed(command.ended(key), key) for command in reversed(self.commands)]

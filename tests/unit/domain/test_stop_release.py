@@ -136,17 +136,6 @@ def test_a_refused_release_leaves_the_robot_standing_and_says_why() -> None:
     assert (changed.key, changed.why) == ("refused", "not_standing")
 
 
-def test_the_refusal_of_one_copy_ends_nothing_while_another_may_act() -> None:
-    bench = releasing()
-
-    bench.answer("REFUSED", why="challenge", attempt=bench.attempt)
-    bench.report(bench.ours)
-
-    assert bench.state == "RELEASING"
-    bench.report(released=(bench.ours.id,), challenge=NEXT_CHALLENGE)
-    assert bench.state == "READY"
-
-
 @pytest.mark.parametrize("result", ["RELEASED", "RESUMED", "REFUSED"])
 @pytest.mark.parametrize("attempt", ["", "01OTHER"])
 def test_an_answer_that_does_not_name_the_attempt_is_none_of_it(
@@ -174,19 +163,6 @@ def test_an_unconfirmed_release_keeps_the_hold_that_a_later_report_shows() -> No
     assert {one.hold_id for one in sends(effects)} == {held.id}
     assert bench.machine.hold_id == held.id
     assert bench.machine.stop is not before
-
-
-def test_a_hold_in_doubt_that_was_lifted_after_all_is_replaced_at_once() -> None:
-    bench = of_three()
-    bench.press("ben")
-
-    effects = bench.report(
-        released=tuple(hold.id for hold in THREE), challenge=NEXT_CHALLENGE
-    )
-
-    assert bench.changes()[-1] == "release_unconfirmed"
-    (named,) = {one.hold_id for one in sends(effects)}
-    assert named not in {hold.id for hold in THREE}
 
 
 def test_a_hold_in_doubt_is_replaced_when_the_robot_says_nothing_for_a_second() -> None:
@@ -310,18 +286,6 @@ def test_an_adopted_hold_ends_when_the_robot_says_that_another_server_released_i
     assert bench.state == "READY"
     assert levels(effects) == ["run"]
     assert not sends(effects)
-
-
-def test_an_adopted_hold_that_somebody_here_asks_for_too_is_stopped_again() -> None:
-    bench = Bench()
-    bench.report(Hold("01OTHER", "iveg", "remote"))
-    bench.stand()
-    bench.press()
-
-    bench.report(released=("01OTHER",))
-
-    assert bench.state == "REQUESTED"
-    assert bench.ours.id != "01OTHER"
 
 
 def closed(effects: list[Effect]) -> dict[str, tuple[str, str]]:

@@ -1,5 +1,7 @@
 """Which sentence the log takes, and what fills its holes."""
 
+from dataclasses import replace
+
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.rule.clear import ClearCondition
@@ -61,6 +63,23 @@ def test_a_line_of_a_robot_ahead_opens_our_decision_when_there_is_one() -> None:
     assert line.decision_id == entry.decision_id
     # A ring that has not grown is not mentioned.
     assert {"radius", "unseen"}.isdisjoint(told(desk)[1])
+
+
+def test_a_peer_is_told_by_its_name_and_no_alert_means_no_other_peer() -> None:
+    desk = Desk()
+    desk.drive("AGI", 0.0)
+    desk.drive("AGII", 1.5)
+    desk.look("AGI")
+    desk.look("AGII")
+
+    slow = safety_report(speed_factor=0.5, reason="robot", cause="AGII")
+    desk.hear(replace(slow, origin=desk.next_origin()))
+    key, slots = told(desk)
+    assert (key, slots["person"]) == ("log.speed_down.robot", "AGII")
+
+    slower = safety_report(speed_factor=0.4, reason="person")
+    desk.hear(replace(slower, origin=desk.next_origin()))
+    assert "person" not in told(desk)[1]
 
 
 def test_nobody_is_unseen_by_the_robot_that_saw_them() -> None:

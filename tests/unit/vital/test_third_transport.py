@@ -19,18 +19,6 @@ def told(desk: Desk, command_id: str) -> CommandModel:
     return CommandModel.of(command, desk.commander.machine("AGI"), desk.clock())
 
 
-async def test_a_stop_goes_over_the_third_transport_again_and_again() -> None:
-    dds = FakeFleet()
-    desk = Desk(also={DDS: dds})
-    hold_id = await stopped(desk)
-
-    await desk.wait(1.05)
-
-    assert dds.stops == [("AGI", hold_id)] * 4
-    assert len(desk.fleet.stops) == 4
-    await desk.commander.close()
-
-
 async def test_a_release_goes_once_over_every_transport_that_can() -> None:
     dds = FakeFleet()
     deaf = FakeFleet()
