@@ -205,7 +205,7 @@ _LEAST, _MOST = -2.0, 3.5
 _HALF_LIFE_S, _FADES_EVERY_S = 20.0, 0.25
 _KNOWN = 0.05
 """Log-odds nearer to zero than this say nothing."""
-_RING_EDGE, _RING_CENTRE = 50, 99
+_ZONE_EDGE, _ZONE_CENTRE = 50, 99
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -279,6 +279,6 @@ def inflate(
     cells = grid.window(x, y, radius_m)
     dx, dy = grid.offsets(cells, x, y)
     inward = 1.0 - np.hypot(dx, dy) / np.float32(radius_m)
-    added = _RING_EDGE + (_RING_CENTRE - _RING_EDGE) * inward
+    added = _ZONE_EDGE + (_ZONE_CENTRE - _ZONE_EDGE) * inward
     laid = np.where(inward >= 0.0, added, UNKNOWN).astype(np.int8)
     cost[cells] = np.maximum(cost[cells], laid)

@@ -3,7 +3,7 @@
 A map without people says something only of cells that were in view.  Aisles are divided
 into cells; a cell counts as seen when a live robot's camera would have seen a whole
 person in its middle, with nothing in between (``sight.visible_from``).  The same view
-may take a ring away.  Recorded robots do not count.
+may end a zone.  Recorded robots do not count.
 """
 
 import math
@@ -22,7 +22,7 @@ CELL_M = 1.0
 MOST_CELLS = 4000
 """A larger greenhouse gets coarser cells, so that none costs more than this."""
 RECENT_S = 10.0
-"""A younger view counts as seen now: a ring is remembered as long."""
+"""A younger view counts as seen now: a zone lasts as long."""
 
 _Floats = NDArray[np.float64]
 

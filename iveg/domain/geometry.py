@@ -6,11 +6,16 @@ in B": the robot's pose in ``map``, the laser's pose in ``base_link``.
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from iveg.domain.wire import Metres, Radians, Speed, digits
+
+_Coordinate = TypeVar("_Coordinate", float, NDArray[np.float64])
+"""Of one point, or of several (m)."""
 
 
 def wrap_angle(angle: float) -> float:
@@ -26,13 +31,17 @@ class Pose2D:
     y: Metres
     yaw: Annotated[Radians, digits(5)]
 
-    def transform(self, x: float, y: float) -> tuple[float, float]:
-        """Take a point from the inner frame to the outer one."""
+    def transform(
+        self, x: _Coordinate, y: _Coordinate
+    ) -> tuple[_Coordinate, _Coordinate]:
+        """Take points from the inner frame to the outer one."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return self.x + c * x - s * y, self.y + s * x + c * y
 
-    def inverse(self, x: float, y: float) -> tuple[float, float]:
-        """Take a point from the outer frame to the inner one."""
+    def inverse(
+        self, x: _Coordinate, y: _Coordinate
+    ) -> tuple[_Coordinate, _Coordinate]:
+        """Take points from the outer frame to the inner one."""
         c, s, dx, dy = math.cos(self.yaw), math.sin(self.yaw), x - self.x, y - self.y
         return c * dx + s * dy, c * dy - s * dx
 

@@ -254,13 +254,13 @@ class Witness:
         gap = self._outline.gap_to(x, y)
         near = (gap > 0.0) & (gap <= LIMITS.zone_default_m)
         away = np.hypot(x, y)[near]
-        x, y = _moved(x[near], y[near], pose)
+        x, y = pose.transform(x[near], y[near])
         left = np.ones(x.shape, np.bool_)
         if self._plan is not None:
             blurred = PLAN_M + abs(twist.angular_z) * _TURN_S * away
             left = self._plan.distance_to(x, y) > blurred
         for one in known:
-            ahead, aside = _seen_from(one.pose, np.column_stack((x, y)))
+            ahead, aside = one.pose.inverse(x, y)
             if one.stands:
                 left &= self._outline.gap_to(ahead, aside) > _BESIDE_PEER_M
             else:
@@ -269,7 +269,7 @@ class Witness:
 
     def _is_ahead(self, body: _Floats, pose: Pose2D, twist: Twist2D) -> bool:
         """Whether a part of a body lies where the robot is driving."""
-        x, y = _seen_from(pose, body)
+        x, y = pose.inverse(*body.T)
         ahead = (x > 0.0) == (twist.linear_x >= 0.0)
         return bool(np.any(ahead & (np.abs(y) <= self._outline.width / 2 + _BESIDE_M)))
 
@@ -293,25 +293,12 @@ class Witness:
     def _measured(self, body: _Floats, pose: Pose2D, now: float) -> Obstacle:
         """Neighbouring returns as an obstacle that is seen for the first time."""
         x, y = body.mean(0).tolist()
-        ahead, aside = _seen_from(pose, body)
+        ahead, aside = pose.inverse(*body.T)
         size_m = float(np.hypot(*np.ptp(body, axis=0)))
         gap_m = float(self._outline.gap_to(ahead, aside).min())
         beside = float(ahead.mean()), float(aside.mean())
         here = x, y
         return Obstacle(here, here, beside, beside, size_m, gap_m, now, now)
-
-
-def _moved(x: _Floats, y: _Floats, frame: Pose2D) -> tuple[_Floats, _Floats]:
-    """Points of a frame with this pose, in ``map``."""
-    c, s = math.cos(frame.yaw), math.sin(frame.yaw)
-    return frame.x + c * x - s * y, frame.y + s * x + c * y
-
-
-def _seen_from(pose: Pose2D, points: _Floats) -> tuple[_Floats, _Floats]:
-    """Points of ``map``, shape (n, 2), in the frame with this pose: x and y."""
-    c, s = math.cos(pose.yaw), math.sin(pose.yaw)
-    x, y = points[:, 0] - pose.x, points[:, 1] - pose.y
-    return c * x + s * y, c * y - s * x
 
 
 def _bodies(points: _Floats) -> Sequence[_Floats]:
