@@ -116,8 +116,8 @@ class Dss:
         )
         self.core = core = self.pipeline.core
         self.supervision = core.supervision
+        inputs = self.stores.inputs
         if settings.recordings:
-            inputs = self.stores.inputs
             self.supervision.listen(
                 RECORDINGS,
                 measured=inputs.measure,
