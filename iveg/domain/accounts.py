@@ -10,7 +10,6 @@ import hashlib
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from itertools import islice
 from typing import Final, Literal, TypeVar
 
 from iveg.domain.audit import Actor
@@ -285,7 +284,6 @@ answer belongs to no sign-in that waits, or proves nothing; the person has no ro
 or is disabled here; too many sign in at once."""
 
 _RANKS: Final[tuple[PersonRole, ...]] = ("viewer", "operator", "admin")
-_MOST_VALUES: Final = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -353,10 +351,9 @@ def values_at(claims: Json, path: str) -> Iterator[str]:
     A claim whose own name is the path, dots and all, comes first.
     """
     if path in claims:
-        found = _walk(claims[path], ())
+        yield from _walk(claims[path], ())
     else:
-        found = _walk(claims, tuple(path.replace("[]", "").split(".")))
-    yield from islice(found, _MOST_VALUES)
+        yield from _walk(claims, tuple(path.replace("[]", "").split(".")))
 
 
 def _walk(value: object, path: tuple[str, ...]) -> Iterator[str]:

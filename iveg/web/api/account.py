@@ -143,7 +143,7 @@ def router(people: People) -> APIRouter:
     @routes.get("", response_model=OwnAccount)
     async def own(who: Reader) -> Response:
         """Name, role and end of whoever asks."""
-        account = people.find(who.person)
+        account = people.known.get(who.person)
         return Json(
             OwnAccount(
                 name=who.name,
@@ -290,7 +290,7 @@ def _other(people: People, user_id: str, who: Principal) -> Account:
     """The account of somebody else: whoever changes accounts stays admin."""
     if user_id == who.person:
         raise HTTPException(409, "Another admin changes your own account.")
-    found = people.find(user_id)
+    found = people.known.get(user_id)
     if found is None:
         raise UnknownNameError("account", user_id)
     return found

@@ -57,10 +57,6 @@ class People:
         """Changes accounts and tokens as somebody; each counts at once."""
         return Admission(self.book, by, self.clock().wall)
 
-    def find(self, person: str) -> Account | None:
-        """The account of this id."""
-        return self.known.get(person)
-
     async def sign_in(self, name: str, password: str) -> Account | None:
         """The account of this name and password; None takes as long.
 
@@ -72,7 +68,7 @@ class People:
         if not found or not fits:
             return None
         # Whoever was changed meanwhile has proved an account that is none any more.
-        now = self.find(found.account_id)
+        now = self.known.get(found.account_id)
         is_same = now is not None and now.password == found.password
         return now if now and is_same and now.is_open(self.clock().wall) else None
 
@@ -108,12 +104,12 @@ class People:
         Raises:
             BusyError: too many sign in at once.
         """
-        account = self.find(who.person)
+        account = self.known.get(who.person)
         was = account.password if account else ""
         if not await self._passwords.fits(old, was):
             return None
         kept = await self._passwords.hashed(new)
-        account = self.find(who.person)
+        account = self.known.get(who.person)
         if account is None or account.password != was or account.disabled:
             return None
         return self.admission(who).give_password(account, kept)

@@ -211,12 +211,3 @@ async def test_keyrock_tells_who_it_is_at_its_own_address(
 
     assert proof.subject == "ana-1"
     assert proof.claims["roles"] == KEYROCK["roles"]
-
-
-def test_nothing_that_is_secret_is_shown_by_a_traceback() -> None:
-    attempt = Attempt(BACK)
-    shown = repr((attempt, Client("https://a.test", CLIENT, SECRET, "")))
-
-    assert not {SECRET, attempt.nonce, attempt.verifier} & set(shown.split("'"))
-    assert SECRET not in shown
-    assert attempt.verifier not in shown
