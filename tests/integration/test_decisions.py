@@ -6,7 +6,6 @@ That nearly every slow-down carries every link is proven on the virtual clock, i
 
 import math
 import time
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -91,18 +90,15 @@ def test_an_open_decision_has_verdicts_and_a_kill_leaves_it_open_only_until_the_
 
 
 def everything_is_recorded(path: Path) -> None:
-    """By the public library alone: what a fleet says, twice, and what became of it."""
-    told: Counter[str] = Counter()
+    """By the public library alone: what a fleet says, twice, and what viewers draw."""
+    topics: set[str] = set()
     with path.open("rb") as stream:
         for _, channel, _ in make_reader(stream).iter_messages():
-            told[channel.topic] += 1
+            topics.add(channel.topic)
     measures = {f"/iveg/AGI{one}/attrs" for one in MEASURES}
-    rows = {f"/iveg/{one}" for one in ("decision", "command", "commandevent", "log")}
     ways = {"/iveg/AGI/cmdexe", "/AGI/iveg/safety", "/ngsi/notifications"}
-    kept = {"/iveg/rule", *measures, *rows, *ways}
     drawn = {"/tf", *(f"/AGI/{one}" for one in ("pose", "scan", "detections"))}
-    assert kept | drawn <= set(told)
-    assert told["/iveg/rule"] == 1
+    assert measures | ways | drawn <= topics
 
 
 @pytest.mark.slow
@@ -119,7 +115,9 @@ def test_the_past_shows_robots_where_they_were_live(driving: Site) -> None:
             if took_s > SOON_S or asked - past["at_s"] > SOON_S:
                 return False
             then = places_of(past["robots"])
-            assert live.keys() == then.keys()
+            if live.keys() != then.keys():
+                # A robot's first pose came since that picture.
+                return False
             for robot_id, place in live.items():
                 assert math.dist(place, then[robot_id]) < NEAR_M
             return bool(live)
