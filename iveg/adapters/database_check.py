@@ -1,13 +1,7 @@
 """Whether the history's database can be used."""
 
-from sqlalchemy.exc import DatabaseError
-
-from iveg.adapters.history.engine import (
-    reading_engine,
-    reason_of,
-    revisions,
-    sqlite_file,
-)
+from iveg.adapters.history.engine import revisions, sqlite_file
+from iveg.adapters.history.queries import ask_once
 from iveg.domain.errors import HopError
 
 
@@ -23,14 +17,7 @@ def check_database(database_url: str) -> None:
         raise HopError(
             "database", f"there is none at {file}; `iveg db upgrade` makes it"
         )
-    engine = reading_engine(database_url)
-    try:
-        with engine.connect() as connection:
-            found, known = revisions(connection)
-    except DatabaseError as error:
-        raise HopError("database", reason_of(error)) from error
-    finally:
-        engine.dispose()
+    found, known = ask_once(database_url, revisions)
     newest = known[0]
     if found is not None and found not in known:
         raise HopError("database", f"a newer iVeg wrote it (migration {found})")

@@ -81,7 +81,9 @@ class Store:
             with engine.begin() as connection:
                 return work(connection)
         except DBAPIError as error:
-            self._let_go(error)
+            # A lock or a full disk passes; the whole file need not be checked again.
+            if not any(word in str(error) for word in ("is locked", "is full")):
+                self.close()
             raise HopError("database", reason_of(error)) from error
 
     def _insert(self, connection: Connection, rows: Sequence[Waiting]) -> None:
@@ -91,7 +93,8 @@ class Store:
                 continue
             try:
                 with connection.begin_nested():
-                    _insert(connection, kind, mapping, of_kind)
+                    statement = _statement(mapping, connection.dialect.name)
+                    connection.execute(statement, _values(of_kind, mapping))
             except (StatementError, *_VALUE_ERRORS) as error:
                 if not _is_fault_of_row(error, connection.engine):
                     raise
@@ -112,21 +115,6 @@ class Store:
             self._engine = writing_engine(self._url)
         return self._engine
 
-    def _let_go(self, error: Exception) -> None:
-        # These pass by themselves; checking the whole file again would only add to it.
-        if not any(word in str(error) for word in ("is locked", "is full")):
-            self.close()
-
-
-def _insert(
-    connection: Connection,
-    kind: type,
-    mapping: TableMapping,
-    rows: Sequence[Waiting],
-) -> None:
-    values = _values(rows, mapping)
-    connection.execute(_statement(kind, connection.dialect.name), values)
-
 
 def _values(rows: Iterable[Waiting], mapping: TableMapping) -> list[_Row]:
     """Rows as columns; of several states of one thing only the newest."""
@@ -144,8 +132,7 @@ def _columns(record: Record) -> _Row:
 
 
 @cache
-def _statement(kind: type, dialect: str) -> Insert:
-    mapping = TABLE_MAPPINGS[kind]
+def _statement(mapping: TableMapping, dialect: str) -> Insert:
     make = postgresql.insert if dialect == "postgresql" else sqlite.insert
     statement = make(mapping.table)
     if not mapping.identity:
@@ -162,9 +149,9 @@ def _statement(kind: type, dialect: str) -> Insert:
 
 def _is_fault_of_row(error: Exception, engine: Engine) -> bool:
     """Whether the values are the cause; else it is the database, and all can wait."""
-    if not isinstance(error, DBAPIError):
-        return True
-    if isinstance(error, IntegrityError | DataError):
+    if isinstance(error, IntegrityError | DataError) or not isinstance(
+        error, DBAPIError
+    ):
         return True
     refused = (InterfaceError, ProgrammingError)
     # Python's SQLite driver reports a type that it cannot bind in one of these two.

@@ -113,7 +113,7 @@ _TYPES: dict[ColumnType, type[TypeEngine[Any]]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class TableMapping:
     """Table of one kind of record.
 

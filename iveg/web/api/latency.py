@@ -4,7 +4,6 @@ It is read in the loop from streams of measures; its figure is drawn in the work
 """
 
 import asyncio
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Annotated
 
@@ -17,8 +16,6 @@ from iveg.domain.latency import (
     DATA,
     PAPER,
     SEGMENTS,
-    Cell,
-    Data,
     LatencyWatch,
     Sketch,
     Window,
@@ -49,12 +46,6 @@ class Asked(BaseModel):
         None, pattern=r"^[A-Za-z0-9-]{1,64}$", description="Robot id; all unless told"
     )
     figures: bool = Field(True, description="Whether to draw the distributions, too")
-
-
-def _row(data: Data, sketches: Mapping[Cell, Sketch]) -> LatencyRow:
-    return LatencyRow(
-        data=data, hops={hop: _spread(sketches[data, hop]) for hop in SEGMENTS}
-    )
 
 
 def _spread(sketch: Sketch) -> SegmentSpread:
@@ -101,7 +92,13 @@ def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
             window=asked.window,
             robot=asked.robot,
             direct=any(sketches[data, "uplink"].count for data in DATA),
-            rows=[_row(data, sketches) for data in DATA],
+            rows=[
+                LatencyRow(
+                    data=data,
+                    hops={hop: _spread(sketches[data, hop]) for hop in SEGMENTS},
+                )
+                for data in DATA
+            ],
             paper={
                 place: {data: asdict(row) for data, row in rows.items()}
                 for place, rows in PAPER.items()

@@ -5,7 +5,6 @@ what was put in is known to the microsecond.
 """
 
 import heapq
-from dataclasses import dataclass
 from itertools import count
 
 import pytest
@@ -20,34 +19,17 @@ from tests.stage import Stage
 CALM_AGENT_S = 0.015
 
 
-@dataclass
-class Radio:
-    """Delays messages and keeps their order, as one connection does.
-
-    Attributes:
-        late_s: Delay of each.
-    """
-
-    late_s: float = 0.0
-    _newest_due: float = 0.0
-
-    def due(self, now: float) -> float:
-        """When a message of now arrives."""
-        self._newest_due = max(self._newest_due, now + self.late_s)
-        return self._newest_due
-
-
 class Air(Stage):
     """A stage whose messages take their time: radio to the broker, agent to Orion.
 
     Attributes:
-        radio: AGI's; AGII's is well.
+        late_s: Delay of AGI's radio, which keeps the order; AGII's is well.
         agent_s: From the broker to Orion.
     """
 
-    def __init__(self, radio: Radio, agent_s: float = CALM_AGENT_S) -> None:
-        self.agent_s = agent_s
-        self.radio = radio
+    def __init__(self, late_s: float = 0.0, agent_s: float = CALM_AGENT_S) -> None:
+        self.late_s, self.agent_s = late_s, agent_s
+        self._newest_due = 0.0
         self._on_way: list[tuple[float, int, TransportId, str, bytes]] = []
         self._numbers = count()
         # Robots speak as soon as they are made.
@@ -67,7 +49,7 @@ class Air(Stage):
         now, device = self.now.mono, topic.split("/")[2]
         due = now
         if device.startswith("AGI_"):
-            due = self.radio.due(now)
+            due = self._newest_due = max(self._newest_due, now + self.late_s)
         transports: tuple[tuple[TransportId, float], ...] = (
             (DIRECT.id, due),
             (FIWARE.id, due + self.agent_s),
@@ -101,7 +83,7 @@ def close(seconds: float) -> object:
 async def test_a_delay_is_found_in_the_hop_that_has_it_and_in_no_other(
     late_s: float, agent_s: float
 ) -> None:
-    air = Air(Radio(late_s), agent_s)
+    air = Air(late_s, agent_s)
 
     await play(air, 12.0)
 
@@ -118,10 +100,10 @@ async def test_a_delay_is_found_in_the_hop_that_has_it_and_in_no_other(
 async def test_a_delay_that_begins_later_is_not_taken_for_a_clock_that_was_set() -> (
     None
 ):
-    air = Air(Radio())
+    air = Air()
     await play(air, 5.0)
 
-    air.radio.late_s = 0.400
+    air.late_s = 0.400
     await play(air, 15.0)
 
     clock = air.desk.latency.clocks["AGI"]

@@ -13,7 +13,7 @@ from fastapi import FastAPI
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Store
 from iveg.domain.observations import Instant
-from iveg.domain.records import DecisionRecord, ReadingRecord, Record
+from iveg.domain.records import ReadingRecord, Record
 from iveg.models.history import Alert
 from iveg.vital.record import Waiting
 from iveg.web import problems
@@ -46,7 +46,6 @@ class Past:
         lay_history(url)
         self._store = Store(url)
         self._queries = Queries(url)
-        self.present: dict[str, DecisionRecord] = {}
         self.alerts: list[Alert] = []
         self.app = FastAPI()
         self.app.dependency_overrides[require("read")] = lambda: None
@@ -55,7 +54,6 @@ class Past:
                 self._queries,
                 FakeWorker(),
                 threshold=lambda: 0.8,
-                present=self.present.get,
                 alerts=lambda: self.alerts,
                 read_clock=lambda: Instant(0.0, NOON + 60.0),
             )
@@ -268,24 +266,6 @@ async def test_the_air_of_a_day_is_drawn_with_its_gaps(
     [humidity] = air["figures"]["humidity"]["data"]
     assert humidity["y"] == [70.0, None, 70.0]
     assert air["figures"]["co2"]["data"] == []
-
-
-async def test_a_database_that_is_away_is_a_problem_and_not_a_crash(
-    tmp_path: Path,
-) -> None:
-    app = FastAPI()
-    queries = Queries("postgresql://somebody:secret@127.0.0.1:1/history")
-    app.dependency_overrides[require("read")] = lambda: None
-    app.include_router(router(queries, FakeWorker()))
-    problems.install(app)
-    transport = httpx.ASGITransport(app=app)
-
-    async with Client(transport=transport, base_url="http://iveg") as client:
-        answer = await client.get("/api/v1/log", params={"format": "csv"})
-
-    queries.close()
-    assert answer.status_code == 503
-    assert "secret" not in answer.text
 
 
 async def test_each_column_of_what_was_measured_is_a_key_of_its_json(
