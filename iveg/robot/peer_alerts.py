@@ -109,7 +109,7 @@ class RuleRadii:
 
     def __init__(self) -> None:
         self._values: dict[Class, list[tuple[float, float]]] = {}
-        """By class: when each value came (monotonic, s), and the value (m), largest first."""
+        """By class: when each came (monotonic, s), and its value (m); largest first."""
 
     def note(self, radii: Mapping[Class, float], now: float) -> None:
         """Note the values of a message."""
