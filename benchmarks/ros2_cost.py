@@ -73,7 +73,8 @@ def bare(domain: int) -> None:
         waitset.wait(duration(seconds=1))
         for message, reader in readers:
             for sample in reader.take(50):
-                cdr.read(message, sample.payload)
+                if sample.sample_info.valid_data:  # else its writer has gone
+                    cdr.read(message, sample.payload)
 
 
 def echo(domain: int) -> None:
@@ -302,9 +303,9 @@ def report(times: dict[str, Times], used: dict[str, float]) -> None:
     cpu = {name: spent / MEASURED_S for name, spent in used.items()}
     shares = [(name, f"{share:.1%}") for name, share in cpu.items()]
     print_table("Processor, share of one core", ("", "core"), shares)
-    p95 = {name: percentile(sorted(one.took), 0.95) for name, one in times.items()}
+    p95_ms = 1e3 * percentile(sorted(times["iveg robot"].took), 0.95)
     print(f"\nCPU {cpu['iveg robot'] / cpu['bare']:.2f} × the bare subscriber (≤ 2)")
-    print(f"P95 {p95['iveg robot'] / p95['echo']:.2f} × the echo (≤ 3)")
+    print(f"P95 {p95_ms:.1f} ms (≤ 15)")
 
 
 def main() -> None:

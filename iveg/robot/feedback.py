@@ -185,7 +185,7 @@ class PeerFeedback:
             now: Monotonic (s).
         """
         beyond = LIMITS.release_beyond_m if slowed else 0.0
-        radius_m = self._radii.of("robot", now)
+        radius_m = self._radii.fresh_m("robot", now)
         for name, topic in self._topics.items():
             silence = now - topic.at
             if silence > LIMITS.zone_lasts_s:
@@ -211,7 +211,7 @@ class PeerFeedback:
                     yield from alert_ahead(kept, self._radii, now)
             peer = topic.peer
             if peer is not None and not peer.stands:
-                yield from peer.ahead(name, self._radii.of("robot", now), now)
+                yield from peer.ahead(name, self._radii.fresh_m("robot", now), now)
 
     def neighbours(self, now: float) -> Iterator[Neighbour]:
         """People and robots of messages that are young enough to give positions.
@@ -227,7 +227,7 @@ class PeerFeedback:
                     yield from neighbour_of(kept.alert, self._radii, now)
             peer = topic.peer
             if peer is not None and now - peer.at <= LIMITS.zone_lasts_s:
-                zone_m = self._radii.of("robot", now)
+                zone_m = self._radii.fresh_m("robot", now)
                 x, y = peer.pose.x, peer.pose.y
                 yield Neighbour("robot", name, x, y, PEER_M, zone_m)
 

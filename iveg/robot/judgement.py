@@ -115,7 +115,7 @@ class Judgement:
         """Note a message of ``/{topic}/mqtt_feedback``."""
         seen = feedback.seen.get(self._id)
         seen_at = self.watchdog.sent_at(seen)
-        if self.authors.apply(topic, feedback, self._own(now), seen_at, now):
+        if self.authors.apply(topic, feedback, self.pose(now), seen_at, now):
             self.watchdog.heard(seen, now)
 
     def note_scan(self, scan: LaserScan, now: float) -> None:
@@ -140,7 +140,7 @@ class Judgement:
         """Evaluate this moment."""
         self.watchdog.tick(now)
         slowed = self.cap.reason in ("person", "robot")
-        peer_caps = [*self.authors.caps(self._own(now), slowed, now)]
+        peer_caps = [*self.authors.caps(self.pose(now), slowed, now)]
         raw = lowest(
             (
                 self.local,
@@ -160,7 +160,8 @@ class Judgement:
         silent = self.watchdog.silence(now) > self._limits.stand_s
         return silent and self._limits.on_link_loss == "stop"
 
-    def _own(self, now: float) -> Pose2D | None:
+    def pose(self, now: float) -> Pose2D | None:
+        """Pose in ``map`` of fresh odometry; None without."""
         motion = self.motion(now)
         return None if motion is None else motion.pose
 

@@ -14,7 +14,7 @@ from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import UnreadableError
 from iveg.domain.fleet import RobotProfile
-from iveg.domain.geometry import REST, Pose2D, Twist2D
+from iveg.domain.geometry import REST, Twist2D
 from iveg.domain.goals import Goal
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
@@ -149,8 +149,6 @@ class RobotNode:
         self.asks_for_scans = False
         self.faults: tuple[RobotFault, ...] = ()
         self._goals = RobotGoals(robot_id, navigate)
-        self._placed: tuple[Pose2D | None, float] = None, 0.0
-        """Newest pose, and when it came (monotonic, s)."""
         self._command_topic = names.command_topic(settings.apikey, robot_id)
         self._desired_topic = names.DESIRED_TOPIC.format(robot_id=robot_id)
         self._is_replay = settings.replay is not None
@@ -255,7 +253,6 @@ class RobotNode:
         mono = now.mono
         for observation in observations:
             if isinstance(observation, Odometry):
-                self._placed = observation.pose, mono
                 self._perform(
                     self.machine.odometry(observation.pose, observation.twist, mono),
                     mono,
@@ -352,12 +349,11 @@ class RobotNode:
             self._answer(*self._goals.settle(self._facts(now)))
 
     def _facts(self, now: float) -> Facts:
-        pose, at = self._placed
         return Facts(
             self.machine.state(now) == "RUNNING",
             self.machine.challenge,
             now - self._started,
-            pose if now - at <= LIMITS.pose_stand_s else None,
+            self.machine.pose(now),
             self.machine.stands(now),
         )
 

@@ -101,47 +101,47 @@ class PeerObserver:
 
 
 class RuleRadii:
-    """Radii of the rule as iVeg told them: of each class the largest of the last 10 s.
+    """Radii of the rule as iVeg sent them: of each class the largest of the last 10 s.
 
     So a robot that is told a smaller radius keeps the greater one for as long as a
     sighting that was made under it has a zone.
     """
 
     def __init__(self) -> None:
-        self._told: dict[Class, list[tuple[float, float]]] = {}
-        """By class: when it was told (monotonic, s) and how much (m), largest first."""
+        self._values: dict[Class, list[tuple[float, float]]] = {}
+        """By class: when each came (monotonic, s), and its value (m); largest first."""
 
     def note(self, radii: Mapping[Class, float], now: float) -> None:
-        """Note what one message told."""
+        """Note the values of a message."""
         for class_, radius_m in radii.items():
-            told = self._told.get(class_, [])
+            values = self._values.get(class_, [])
             larger = [
                 earlier
-                for earlier in told
+                for earlier in values
                 if earlier[1] > radius_m and _counts(earlier, now)
             ]
-            self._told[class_] = [*larger, (now, radius_m)]
+            self._values[class_] = [*larger, (now, radius_m)]
 
     @property
-    def is_told(self) -> bool:
-        """Whether iVeg told any."""
-        return bool(self._told)
+    def is_known(self) -> bool:
+        """Whether iVeg sent any."""
+        return bool(self._values)
 
-    def of(self, class_: Class, now: float) -> float:
-        """The radius of a fresh zone of this class (m); unless told that of the paper.
+    def fresh_m(self, class_: Class, now: float) -> float:
+        """Radius of a fresh zone of this class (m); by default that of the paper.
 
-        What was told last counts until something else is told.
+        The newest value counts until another comes, however old it is.
         """
-        told = self._told.get(class_)
-        if not told:
+        values = self._values.get(class_)
+        if not values:
             return LIMITS.zone_default_m
         return next(
-            (earlier[1] for earlier in told if _counts(earlier, now)), told[-1][1]
+            (earlier[1] for earlier in values if _counts(earlier, now)), values[-1][1]
         )
 
 
-def _counts(told: tuple[float, float], now: float) -> bool:
-    return now - told[0] <= LIMITS.zone_lasts_s
+def _counts(value: tuple[float, float], now: float) -> bool:
+    return now - value[0] <= LIMITS.zone_lasts_s
 
 
 @dataclass(slots=True)
@@ -192,9 +192,9 @@ def zone_radius(
     alert: FeedbackAlert, radii: RuleRadii, silence: float, now: float
 ) -> float:
     """The radius of an alert after so long a silence, at least the rule's (m)."""
-    told_m = radii.of(alert.class_ or "person", now)
+    told_m = radii.fresh_m(alert.class_ or "person", now)
     if alert.radius_m is not None:
-        told_m = max(alert.radius_m, told_m) if radii.is_told else alert.radius_m
+        told_m = max(alert.radius_m, told_m) if radii.is_known else alert.radius_m
     return grown_radius(told_m, silence)
 
 

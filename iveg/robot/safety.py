@@ -115,6 +115,10 @@ class SafetyMachine:
         """Whether fresh odometry shows the robot at rest."""
         return self._judgement.stands(now)
 
+    def pose(self, now: float) -> Pose2D | None:
+        """Where it is in ``map``; None while that is not known, or old."""
+        return self._judgement.pose(now)
+
     @property
     def holds(self) -> HoldSet:
         """Current holds and those already released."""

@@ -27,11 +27,13 @@ class Qos:
     transient_local: bool = False
     depth: int = 10
 
-    def hears(self, offered: "Qos") -> bool:
-        """Whether a reader with this request matches a writer with that offer."""
-        return (offered.reliable or not self.reliable) and (
-            offered.transient_local or not self.transient_local
-        )
+    def lacks(self, offered: "Qos") -> str:
+        """Difference of a writer's offer from this request; empty: they match."""
+        if self.reliable and not offered.reliable:
+            return "best effort → reliable"
+        if self.transient_local and not offered.transient_local:
+            return "volatile → transient local"
+        return ""
 
     def __str__(self) -> str:
         """As ``iveg robot check`` prints it."""

@@ -144,17 +144,6 @@ async def at_work(riding: Riding) -> AsyncIterator[tuple[Iveg, Sensors]]:
                 await asyncio.gather(*tasks, return_exceptions=True)
 
 
-async def reported(iveg: Iveg, faults: set[str], factor: float) -> None:
-    """Until the robot says that it drives so fast, because of these."""
-    async with asyncio.timeout(30.0):
-        while not (  # noqa: ASYNC110 - another process changes it
-            iveg.report is not None
-            and {one.code for one in iveg.report.faults} == faults
-            and iveg.report.speed_factor == factor
-        ):
-            await asyncio.sleep(0.05)
-
-
 async def test_a_detector_with_its_own_messages_tells_iveg_of_its_person(
     riding: Riding,
 ) -> None:
@@ -166,19 +155,6 @@ async def test_a_detector_with_its_own_messages_tells_iveg_of_its_person(
     (seen,) = iveg.frame.detections
     assert (seen.class_id, seen.frame_id) == ("farmer", "map")
     assert math.dist(seen.box.centre[:2], (3.0, 0.5)) <= 0.1
-
-
-async def test_a_publisher_that_starts_after_the_gate_makes_it_stand(
-    riding: Riding,
-) -> None:
-    async with at_work(riding) as (iveg, _):
-        await reported(iveg, set(), 1.0)
-
-        with Dds(loopback(riding.domain)) as other:
-            other.writer("/cmd_vel", ros.Twist, names.DEFAULT)
-            async with asyncio.timeout(8.0):
-                await reported(iveg, {"second_publisher"}, 0.0)
-        await reported(iveg, set(), 1.0)
 
 
 async def test_a_check_tells_a_robot_that_talks_what_it_lacks(riding: Riding) -> None:

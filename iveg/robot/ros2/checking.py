@@ -72,11 +72,7 @@ def deafness(reader: Endpoint, message: type[Message], offered: Qos) -> str:
     """Why a reader does not hear a writer: what is sent → what it wants; else empty."""
     if reader.type != message.ROS:
         return f"{_short(message.ROS)} → {_short(reader.type)}"
-    if reader.qos.reliable and not offered.reliable:
-        return "best effort → reliable"
-    if reader.qos.transient_local and not offered.transient_local:
-        return "volatile → transient local"
-    return ""
+    return reader.qos.lacks(offered)
 
 
 def _short(ros_type: str) -> str:
@@ -195,7 +191,7 @@ def _badness(
         form = row.form(end.type)
         if form and end.type_hash not in ("", *map(type_hash, definitions(form))):
             return f"other fields: {end.type_hash} there, {type_hash(form)} here"
-        if not config.quality(topic).hears(end.qos):
+        if config.quality(topic).lacks(end.qos):
             return f"another quality of service is asked for: qos.{topic}"
     if rate_hz < _LEAST_HZ.get(topic, 0.0):
         return "slow" if rate_hz else "silent"

@@ -21,7 +21,6 @@ from iveg.robot.node import NodeSettings
 from iveg.robot.ros2.config import RobotConfig, RosTable
 from iveg.robot.ros2.inputs import SensorInputs
 from iveg.robot.ros2.rig import Ros2Robot
-from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as ros
 from tests.builders import AGI
 from tests.fakes.ros2_network import FakeNetwork, endpoint
@@ -194,18 +193,3 @@ async def test_when_it_ends_the_base_is_told_to_rest(tmp_path: Path) -> None:
 
     assert len(site.driven) > before
     assert site.driven[-1] == ros.Twist()
-
-
-async def test_a_detector_is_read_in_the_type_in_which_it_publishes(
-    site: Site,
-) -> None:
-    topic = "/agi/detections_3d"
-    site.network.others.append(endpoint(topic, d.BoundingBoxes3d))
-    await until(lambda: topic in site.network.asked)
-    placed(site.network)
-    bad = d.BoundingBox3d("farmer", 2.0)
-
-    site.network.publish(topic, d.BoundingBoxes3d(bounding_boxes=(bad,)))
-
-    await until(lambda: site.faults() & {"bad_probability", "no_transform"})
-    assert "unreadable" not in site.faults()
