@@ -46,10 +46,9 @@ async def until(true: Callable[[], object]) -> None:
 
 @dataclass
 class Cloud:
-    """Hears everything, answers with feedback at 10 Hz while ``speaks``."""
+    """Hears everything, answers with feedback at 10 Hz."""
 
     address: BrokerAddress
-    speaks: bool = True
     speed_limits: dict[str, SpeedLimit] = field(default_factory=dict)
     heard: dict[str, list[Observation]] = field(
         default_factory=lambda: defaultdict(list)
@@ -114,7 +113,7 @@ class Cloud:
         while True:
             await asyncio.sleep(0.1)
             seq += 1
-            if not self.speaks or not self.link.connected:
+            if not self.link.connected:
                 continue
             for robot_id in list(self.heard):
                 seen = {robot_id: self.report(robot_id).origin.seq or 0}

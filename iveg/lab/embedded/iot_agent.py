@@ -194,6 +194,11 @@ def _status_change(name: str, status: str, now: float) -> dict[str, Attribute]:
     }
 
 
+_ABOUT = {
+    "libVersion": "4.14.0-iveg-embedded",
+    "baseRoot": "/",
+    "version": "3.14.0-iveg-embedded",
+}
 _log = logging.getLogger(__name__)
 _READERS = {"attrs": read_measure, "cmdexe": read_answer}
 
@@ -225,8 +230,17 @@ class IotAgent:
         self._broker.providers[url] = self.command
 
     def north_port(self) -> Starlette:
-        """Its HTTP side."""
-        return iota_api(self)
+        """Its HTTP side, which answers requests as the real one does."""
+        table = {
+            "GET /iot/about": self._about,
+            "GET /iot/services": self._list_groups,
+            "POST /iot/services": self._create_groups,
+            "PUT /iot/services": self._change_group,
+            "GET /iot/devices": self._list_devices,
+            "POST /iot/devices": self._create_devices,
+            "DELETE /iot/devices/{id}": self._delete_device,
+        }
+        return fiware_app(table, "name", "message")
 
     # --- measures ---------------------------------------------------------------
 
@@ -283,21 +297,6 @@ class IotAgent:
             )
         self.devices[key] = self._by_place[device.place] = device
 
-    def forget(self, scope: Scope, device_id: str) -> None:
-        """Delete a device and its registration.
-
-        Raises:
-            FiwareError: 404.
-        """
-        for key, device in self.devices.items():
-            if key[0] == scope and device.device_id == device_id:
-                break
-        else:
-            raise _no_device(device_id)
-        self._registrations(device).pop(device.registration_id, None)
-        del self.devices[key]
-        self._by_place.pop(device.place, None)
-
     def _registrations(self, device: AgentDevice) -> dict[str, Registration]:
         return self._broker.tenant(device.service).registrations
 
@@ -331,54 +330,21 @@ class IotAgent:
             )
             self._write(device, _status_change(command, "PENDING", now))
 
+    # --- its HTTP side ------------------------------------------------------------
 
-def _no_device(name: str) -> FiwareError:
-    return FiwareError("DEVICE_NOT_FOUND", f"No device was found with id:{name}")
-
-
-# --- north port -------------------------------------------------------------------
-
-_ABOUT = {
-    "libVersion": "4.14.0-iveg-embedded",
-    "baseRoot": "/",
-    "version": "3.14.0-iveg-embedded",
-}
-
-
-def iota_api(agent: IotAgent) -> Starlette:
-    """The north port of an agent, which answers requests as the real one does."""
-    api = _NorthPort(agent)
-    table = {
-        "GET /iot/about": api.about,
-        "GET /iot/services": api.list_groups,
-        "POST /iot/services": api.create_groups,
-        "PUT /iot/services": api.change_group,
-        "GET /iot/devices": api.list_devices,
-        "POST /iot/devices": api.create_devices,
-        "DELETE /iot/devices/{id}": api.delete_device,
-    }
-    return fiware_app(table, "name", "message")
-
-
-class _NorthPort:
-    """``/iot/services`` and ``/iot/devices``."""
-
-    def __init__(self, agent: IotAgent) -> None:
-        self._agent = agent
-
-    async def about(self, _: Request) -> Response:
+    async def _about(self, _: Request) -> Response:
         return _json(_ABOUT)
 
-    async def list_groups(self, request: Request) -> Response:
+    async def _list_groups(self, request: Request) -> Response:
         scope = _scope(request)
         groups = [
             group.model_dump(exclude_none=True)
-            for key, group in self._agent.groups.items()
+            for key, group in self.groups.items()
             if key[0] == scope
         ]
         return _page(request, "services", groups)
 
-    async def create_groups(self, request: Request) -> Response:
+    async def _create_groups(self, request: Request) -> Response:
         scope = _scope(request)
         for raw in await _listed(request, "services"):
             if not raw.get("entity_type"):
@@ -390,22 +356,22 @@ class _NorthPort:
             mine = {"service": scope.service, "subservice": scope.path}
             group = _read(Group, {**raw, **mine})
             key = scope, group.resource, group.apikey
-            if key in self._agent.groups:
+            if key in self.groups:
                 raise FiwareError(
                     "DUPLICATE_GROUP",
                     "A device configuration already exists for resource "
                     f"{group.resource} and API Key {group.apikey}",
                 )
-            self._agent.groups[key] = group
+            self.groups[key] = group
         return _json({}, 201)
 
-    async def change_group(self, request: Request) -> Response:
+    async def _change_group(self, request: Request) -> Response:
         """Change a group; absent fields stay."""
         resource, apikey = (
             request.query_params.get(name, "") for name in ("resource", "apikey")
         )
         key = _scope(request), resource, apikey
-        raw, group = await _object(request), self._agent.groups.get(key)
+        raw, group = await _object(request), self.groups.get(key)
         if group is None:
             raise FiwareError(
                 "DEVICE_GROUP_NOT_FOUND",
@@ -413,27 +379,38 @@ class _NorthPort:
                 '["resource","apikey"] and values: '
                 f'{{"resource":"{resource}","apikey":"{apikey}"}}',
             )
-        self._agent.groups[key] = _read(Group, {**group.model_dump(), **raw})
+        self.groups[key] = _read(Group, {**group.model_dump(), **raw})
         return Response(status_code=204)
 
-    async def list_devices(self, request: Request) -> Response:
+    async def _list_devices(self, request: Request) -> Response:
         scope = _scope(request)
         devices = [
-            device.show()
-            for key, device in self._agent.devices.items()
-            if key[0] == scope
+            device.show() for key, device in self.devices.items() if key[0] == scope
         ]
         return _page(request, "devices", devices)
 
-    async def create_devices(self, request: Request) -> Response:
+    async def _create_devices(self, request: Request) -> Response:
         scope = _scope(request)
         for raw in await _listed(request, "devices"):
-            self._agent.provision(raw, scope)
+            self.provision(raw, scope)
         return _json({}, 201)
 
-    async def delete_device(self, request: Request) -> Response:
-        self._agent.forget(_scope(request), request.path_params["id"])
+    async def _delete_device(self, request: Request) -> Response:
+        """Delete a device and the registration of its commands."""
+        mine = _scope(request), request.path_params["id"]
+        for key, device in self.devices.items():
+            if (key[0], device.device_id) == mine:
+                break
+        else:
+            raise _no_device(mine[1])
+        self._registrations(device).pop(device.registration_id, None)
+        del self.devices[key]
+        self._by_place.pop(device.place, None)
         return Response(status_code=204)
+
+
+def _no_device(name: str) -> FiwareError:
+    return FiwareError("DEVICE_NOT_FOUND", f"No device was found with id:{name}")
 
 
 def _scope(request: Request) -> Scope:

@@ -8,12 +8,14 @@ an open field is treated as lanes beside each other.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 from iveg.adapters.fleet_files import built_in
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription, RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
+from iveg.lab.emulator.greenhouse import Floats
 from iveg.lab.emulator.scenarios import (
     TESTBED,
     RobotScript,
@@ -141,18 +143,19 @@ def _free_stretch(
     ends: tuple[tuple[float, float], ...], greenhouse: Greenhouse
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """The longest part of a line without crates, trolleys and posts."""
-    line = route_of(ends, 0.0, False).points
-    best, run = (0, 0), 0
-    for index, (x, y) in enumerate(line):
-        things = (thing.area for thing in greenhouse.obstacles)
-        blocked = any(area.contains(x, y, _KEEP_OFF_M) for area in things) or any(
-            math.hypot(post.x - x, post.y - y) < post.radius + _KEEP_OFF_M
+
+    def is_free(point: Floats) -> bool:
+        x, y = point
+        return not any(
+            thing.area.contains(x, y, _KEEP_OFF_M) for thing in greenhouse.obstacles
+        ) and all(
+            math.dist((post.x, post.y), (x, y)) >= post.radius + _KEEP_OFF_M
             for post in greenhouse.posts
         )
-        run = index + 1 if blocked else run
-        if index - run > best[1] - best[0]:
-            best = (run, index)
-    (ax, ay), (bx, by) = line[best[0]], line[best[1]]
+
+    line = groupby(route_of(ends, 0.0, False).points, is_free)
+    longest = max((list(points) for free, points in line if free), key=len)
+    (ax, ay), (bx, by) = longest[0], longest[-1]
     return (float(ax), float(ay)), (float(bx), float(by))
 
 

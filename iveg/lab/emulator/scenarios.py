@@ -9,7 +9,7 @@ y = 3.5 to 16.5 m.  ``layout.py`` fits a scenario to other fleets and greenhouse
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -268,41 +268,35 @@ _NORTH, _SOUTH, _WEST = math.pi / 2, -math.pi / 2, math.pi
 
 # --- robots of the testbed --------------------------------------------------------
 
-_SCOUT_CORNERS = ((10.0, 2.2), (10.0, 17.8), (6.0, 17.8), (6.0, 2.2))
 _LOOK_OUT = Station(10.0, 4.0, dwell_s=1.0, period_s=80.0, offset_s=10.0)
 """AGI waits at the entry of corridor 3, in view of the worker there, while AGII passes
 the same worker on the other side of the crop."""
 
 _SCOUT = RobotScript(
     Pose2D(10.0, 3.8, _NORTH),
-    _SCOUT_CORNERS,
+    ((10.0, 2.2), (10.0, 17.8), (6.0, 17.8), (6.0, 2.2)),
     0.6,
     "scouting",
     stations=(_LOOK_OUT,),
 )
-_WATCH = RobotScript(
-    Pose2D(10.0, 3.8, _NORTH),
-    _SCOUT_CORNERS,
-    0.6,
-    "watching",
-    stations=(Station(10.0, 4.0, dwell_s=math.inf),),
+_WATCH = replace(
+    _SCOUT, task="watching", stations=(Station(10.0, 4.0, dwell_s=math.inf),)
 )
-_HAUL_CORNERS = ((18.0, 2.0), (18.0, 18.0), (13.2, 18.0), (13.2, 2.0))
 _HAUL = RobotScript(
     Pose2D(13.2, 14.7, _SOUTH),
-    _HAUL_CORNERS,
+    ((18.0, 2.0), (18.0, 18.0), (13.2, 18.0), (13.2, 2.0)),
     2.3,
     "hauling",
     stations=(Station(13.2, 15.0, dwell_s=1.0, period_s=80.0),),
 )
-_HAUL_ON = RobotScript(Pose2D(13.2, 13.0, _SOUTH), _HAUL_CORNERS, 2.3, "hauling")
+_HAUL_ON = replace(_HAUL, start=Pose2D(13.2, 13.0, _SOUTH), stations=())
 _LAPS = RobotScript(
     Pose2D(8.9, 7.8, _NORTH),
     ((8.9, 6.0), (8.9, 14.0), (11.1, 14.0), (11.1, 6.0)),
     0.6,
     "scouting",
 )
-_THROUGH = RobotScript(Pose2D(10.0, 7.0, _NORTH), _SCOUT_CORNERS, 0.6, "scouting")
+_THROUGH = replace(_SCOUT, start=Pose2D(10.0, 7.0, _NORTH), stations=())
 _PAST_THE_END = RobotScript(
     Pose2D(10.4, 11.0, _NORTH),
     ((10.4, 2.2), (10.4, 17.8), (6.0, 17.8), (6.0, 2.2)),

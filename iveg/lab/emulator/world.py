@@ -76,6 +76,7 @@ class RobotHardware:
 
     Attributes:
         command: Last command of the drive.
+        detector: Camera and detector.
         faults: Faults in force; those of the camera show here.
     """
 
@@ -93,7 +94,7 @@ class RobotHardware:
         self.faults = FaultOrder(robot=robot_id)
         self._rng = rng
         self._odometer = Odometer(rng)
-        self._detector = EmulatedDetector(profile, detector, rng)
+        self.detector = EmulatedDetector(profile, detector, rng)
         self.vehicle = Vehicle(self.profile, script.start)
         self._believed = script.start
         self._navigator = Navigator(profile, script)
@@ -158,13 +159,8 @@ class RobotHardware:
             targets = [target for target in targets if target.class_id != PERSON]
         if faults.thing is not None:
             targets.append(thing_target(faults.thing.x, faults.thing.y))
-        found = self._detector.detect(now, pose, targets, around.scenery)
-        return DetectionFrame(self.robot_id, Origin(), found, (), self._detector.name)
-
-    def part_seen(self, target: Target, around: "SimulatedWorld") -> float:
-        """Visible share of a target from its camera, whatever the detector reports."""
-        camera = self.vehicle.pose.compose(self.profile.camera)
-        return self._detector.part_seen(camera, target.body, around.scenery)
+        found = self.detector.detect(now, pose, targets, around.scenery)
+        return DetectionFrame(self.robot_id, Origin(), found, (), self.detector.name)
 
     def navigation(self) -> Navigation:
         """The intent: task, goal and path."""
@@ -253,8 +249,9 @@ def in_view(
     rig: RobotHardware, world: SimulatedWorld
 ) -> Iterator[tuple[Target, float]]:
     """Targets in view of a robot's camera, with the visible share (0 to 1)."""
+    camera = rig.vehicle.pose.compose(rig.profile.camera)
     for target in world.targets_for(rig.robot_id):
-        part = rig.part_seen(target, world)
+        part = rig.detector.part_seen(camera, target.body, world.scenery)
         if part > 0.0:
             yield target, part
 

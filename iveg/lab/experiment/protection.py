@@ -35,8 +35,6 @@ NEAR_M = 2.0
 AWAY_M = 4.0
 """Slowed with nobody so near is needless (m)."""
 MOVES_M_S = 0.05
-SLOW_SHARE = 0.55
-"""Share of the speed that a robot wants: half, and what noise adds."""
 AHEAD_S = 1.5
 """So long before its entry an encounter should be published (s)."""
 ROUNDING_S = 1e-6
@@ -83,24 +81,6 @@ class NearMoment:
         return self.factor <= HALF_SPEED
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """A robot and a person in view came within two metres.
-
-    Attributes:
-        speed_share: Of its wanted speed that the robot drove.
-        foretold_s: For how long iVeg had published it (s); None: it had not.
-    """
-
-    speed_share: float
-    foretold_s: float | None
-
-    @property
-    def is_foretold(self) -> bool:
-        """Whether iVeg published it long enough before."""
-        return (self.foretold_s or 0.0) >= AHEAD_S - ROUNDING_S
-
-
 def _seconds() -> defaultdict[Sight, float]:
     return defaultdict(float)
 
@@ -115,7 +95,7 @@ class Protection:
             while it was limited.
         needless_s: A moving robot was limited with nobody near at all.
         delays_s: Of each encounter; None: the robot was never limited.
-        entries: Each as ``Entry`` has it.
+        foretold_s: Of each entry, for how long iVeg had published it; None: it had not.
     """
 
     driven_s: float = 0.0
@@ -123,7 +103,7 @@ class Protection:
     near_s: defaultdict[Sight, float] = field(default_factory=_seconds)
     slowed_s: defaultdict[Sight, float] = field(default_factory=_seconds)
     delays_s: list[float | None] = field(default_factory=list)
-    entries: list[Entry] = field(default_factory=list)
+    foretold_s: list[float | None] = field(default_factory=list)
 
     def row(self) -> Json:
         """The numbers by name; None where there was nothing to count."""
@@ -131,8 +111,7 @@ class Protection:
         by_sight = {
             sight: share(self.slowed_s[sight], self.near_s[sight]) for sight in SIGHTS
         }
-        foretold = sum(entry.is_foretold for entry in self.entries)
-        slow = sum(entry.speed_share <= SLOW_SHARE for entry in self.entries)
+        foretold = sum((s or 0.0) >= AHEAD_S - ROUNDING_S for s in self.foretold_s)
         return {
             "near_s": {sight: round(self.near_s[sight], 2) for sight in SIGHTS},
             "slowed": {**by_sight, "all": share(slowed, near)},
@@ -140,9 +119,8 @@ class Protection:
             "never_slowed": self.delays_s.count(None),
             "delay_p95_s": p95([s for s in self.delays_s if s is not None]),
             "needless": share(self.needless_s, self.driven_s),
-            "entries": len(self.entries),
-            "foretold": share(foretold, len(self.entries)),
-            "entered_slow": share(slow, len(self.entries)),
+            "entries": len(self.foretold_s),
+            "foretold": share(foretold, len(self.foretold_s)),
         }
 
 
@@ -156,7 +134,7 @@ def total_of(runs: Iterable[Protection]) -> Protection:
             total.near_s[sight] += run.near_s[sight]
             total.slowed_s[sight] += run.slowed_s[sight]
         total.delays_s += run.delays_s
-        total.entries += run.entries
+        total.foretold_s += run.foretold_s
     return total
 
 
@@ -320,7 +298,7 @@ def _note_entry(
     if enters and is_known and moment.wanted > MOVES_M_S:
         is_foretold = at - pair.foretold_at <= _PAUSE_S
         foretold_s = round(at - pair.foretold_since, 3) if is_foretold else None
-        sums.entries.append(Entry(round(moment.speed / moment.wanted, 4), foretold_s))
+        sums.foretold_s.append(foretold_s)
     pair.is_outside = person.distance_m > NEAR_M
     if person.foretold:
         if at - pair.foretold_at > _PAUSE_S:

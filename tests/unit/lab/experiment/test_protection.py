@@ -5,7 +5,6 @@ from typing import Any
 import pytest
 
 from iveg.lab.experiment.protection import (
-    Entry,
     NearMoment,
     NearPerson,
     Protection,
@@ -105,9 +104,9 @@ def test_an_entry_was_foretold_since_iveg_told_of_it_without_a_break(
 ) -> None:
     before = [moment(step, 3.0, foretold=step in told_at) for step in range(4)]
 
-    [entry] = score_of(*before, moment(4, 1.9, foretold=True)).entries
+    score = score_of(*before, moment(4, 1.9, foretold=True))
 
-    assert entry == Entry(0.75, foretold_s)
+    assert score.foretold_s == [foretold_s]
     share = score_of(*before, moment(4, 1.9)).row()["foretold"]
     assert share == float((foretold_s or 0.0) >= 1.5)
 
@@ -120,7 +119,7 @@ def test_an_entry_of_somebody_in_view_for_less_than_two_seconds_is_none(
 
     score = score_of(*hidden, moment(3, 3.0), moment(4, 1.9, sight=sight))
 
-    assert score.entries == []
+    assert score.foretold_s == []
 
 
 # --- worlds as files have them --------------------------------------------------------

@@ -20,7 +20,7 @@ from iveg.lab.experiment.plan import (
     directory_of,
     write_json,
 )
-from iveg.lab.experiment.protection import Entry, Protection
+from iveg.lab.experiment.protection import Protection
 from iveg.lab.experiment.report import write_report
 from iveg.lab.experiment.scoring import Tally
 
@@ -33,7 +33,7 @@ GUARDED = Protection(
     defaultdict(float, {"in_view": 8.0, "unseen": 4.0}),
     defaultdict(float, {"in_view": 7.0, "unseen": 1.0}),
     [0.0, 0.4, None],
-    [Entry(0.5, 2.0), Entry(0.9, None)],
+    [2.0, None],
 )
 """Eight seconds near people in view, seven of them slowed."""
 
@@ -98,7 +98,7 @@ def test_the_report_says_who_was_protected_by_detector_and_rule() -> None:
     assert "in 1 of 3 encounters never" in page
     near = "<td>8.0</td><td>87.5%</td><td>4.0</td><td>25.0%</td>"
     encounters = "<td>3</td><td>1</td><td>0.38</td><td>10.0%</td>"
-    entries = "<td>2</td><td>50.0%</td><td>50.0%</td>"
+    entries = "<td>2</td><td>50.0%</td>"
     for where, rule in (
         ("scenarios", "iveg"),
         ("demo", "paper"),
