@@ -167,10 +167,11 @@ async def _ensure_device(
 def _as_read(device: Document) -> Document:
     """A device as the agent says it, with what it may leave out."""
     attributes = [
-        {"object_id": one["name"]} | {k: v for k, v in one.items() if v is not None}
-        for one in device.get("attributes", [])
+        {**attribute, "object_id": attribute.get("object_id") or attribute["name"]}
+        for attribute in device.get("attributes", [])
     ]
-    return device | {"attributes": attributes, "protocol": names.PROTOCOL}
+    said = {"commands": [], **device}
+    return said | {"attributes": attributes, "protocol": names.PROTOCOL}
 
 
 async def _clear_registration(orion: OrionClient, robot_id: str) -> list[str]:

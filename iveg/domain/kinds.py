@@ -55,14 +55,12 @@ class Sensor:
     Attributes:
         shown: Name of the quantity on the card (``robot.{name}_level``; while a flag
             of the sensor is true, ``robot.{name}_{flag}``).
-        gauge: Whether a bar from its least to its most stands beside the number.
         every_s: How often a robot sends it (s).
         kept_every_s: The history keeps one of this time (s).
         low: When it is worth an alert.
     """
 
     shown: str
-    gauge: bool = False
     every_s: float = 5.0
     kept_every_s: float = 60.0
     low: Low | None = None

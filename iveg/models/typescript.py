@@ -13,7 +13,7 @@ from pathlib import Path
 from pydantic.json_schema import models_json_schema
 
 from iveg.domain.kinds import SENSED, Kind, Sensor
-from iveg.domain.quantities import flags_of, quantities_of
+from iveg.domain.quantities import flags_of
 from iveg.domain.records import Json
 from iveg.domain.situation import ORDER
 from iveg.models.access import Invitation, NewToken, OpenSession, OwnAccount, SignInCode
@@ -139,13 +139,8 @@ def _row(members: Mapping[str, object]) -> str:
 
 
 def _shown(kind: Kind, sensor: Sensor) -> dict[str, object]:
-    shown = quantities_of(kind.of)[sensor.shown]
-    return {
-        "name": kind.name,
-        "shown": sensor.shown,
-        "flags": flags_of(kind.of),
-        "gauge": [shown.least, shown.most] if sensor.gauge else None,
-    }
+    flags = flags_of(kind.of)
+    return {"name": kind.name, "shown": sensor.shown, "flags": flags}
 
 
 def write_order() -> str:

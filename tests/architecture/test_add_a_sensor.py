@@ -39,7 +39,6 @@ class SoilMoisture(Observation):
         "soil_moisture",
         Sensor(
             shown="percentage",
-            gauge=True,
             every_s=1.0,
             low=Low("percentage", below=15, above=20),
         ),

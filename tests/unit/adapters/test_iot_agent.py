@@ -76,19 +76,6 @@ async def test_a_device_that_drifted_is_made_anew(site: Site) -> None:
     assert (await site.provision("AGI")).mended == ()
 
 
-async def test_an_agent_that_forgot_our_devices_leaves_no_entities_of_its_own(
-    site: Site,
-) -> None:
-    await site.provision("AGI")
-    for device in names.ROBOT_DEVICES:
-        await site.agent.delete_device("AGI" + device.suffix)
-    site.up.agent.hear("/iveg/AGI_odom/attrs", b'{"base_pose_ground_truth":{}}')
-
-    robots = await site.orion.read_robots()
-    assert "Robot:AGI_odom" not in {robot["id"] for robot in robots}
-    assert "AGI_odom" not in str(await site.agent.read_devices())
-
-
 async def test_a_command_that_was_never_registered_gets_its_road(site: Site) -> None:
     await site.provision("AGI")
     (registration,) = await site.orion.read_registrations()

@@ -11,8 +11,6 @@ import pytest
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.transports import MqttTransport
 from iveg.domain.errors import HopError
-from iveg.domain.feedback import Feedback
-from iveg.domain.observations import Origin
 from iveg.lab.embedded.mqtt_broker import mqtt_broker
 from tests.ports import free_ports
 
@@ -111,37 +109,6 @@ async def test_connections_apart_come_and_go_together() -> None:
                 link.enqueue(f"/{number}", b"")
             await until(lambda: len(heard) == 5)
         await lost.wait()
-
-
-async def test_messages_at_qos_1_go_together_and_newer_ones_after_their_pubacks() -> (
-    None
-):
-    said: asyncio.Queue[bytes] = asyncio.Queue()
-    acknowledges = asyncio.Event()
-
-    async def broker(
-        reader: asyncio.StreamReader, writer: asyncio.StreamWriter
-    ) -> None:
-        await reader.read(1000)
-        writer.write(CONNACK)
-        said.put_nowait(await reader.readexactly(2 * len(first)))
-        await acknowledges.wait()
-        writer.write(b"\x40\x02\x00\x02" + b"\x40\x02\x00\x01")
-        said.put_nowait(await reader.readexactly(len(first)))
-        writer.close()
-
-    first = b"\x32\x06\x00\x01a\x00\x011"
-    async with await asyncio.start_server(broker, "127.0.0.1", 0) as server:
-        port = server.sockets[0].getsockname()[1]
-        link = MqttLink(BrokerAddress("127.0.0.1", port), "test")
-        link.enqueue("a", b"1", qos=1)
-        link.enqueue("b", b"2", qos=1)
-        async with running(link):
-            assert await said.get() == first + b"\x32\x06\x00\x01b\x00\x022"
-            link.enqueue("a", b"3", qos=1)
-            assert said.empty()
-            acknowledges.set()
-            assert await said.get() == b"\x32\x06\x00\x01a\x00\x033"
 
 
 async def test_an_order_waits_for_no_confirmation_of_telemetry() -> None:
@@ -249,24 +216,6 @@ async def test_a_mistake_of_who_listens_ends_the_link_and_not_its_connection_alo
 
 
 # --- the direct transport ---------------------------------------------------------
-
-
-async def test_the_direct_transport_speaks_as_the_contract_says() -> None:
-    async with mqtt_broker("127.0.0.1", 0) as broker:
-        port = broker.port
-        heard = Heard(port, "/iveg/AGI/cmd", "/AGI/iveg/desired", "/+/mqtt_feedback")
-        transport = MqttTransport(heard.link, "iveg")
-        async with running(heard.link):
-            await until(lambda: heard.link.connected)
-            await transport.stop("AGI", "01A", "x")
-            await transport.set_desired_state("AGI", "stopped", ["01A"])
-            transport.publish_feedback(Feedback("AGI", Origin("b", 1, "t")))
-            await until(lambda: len(heard.messages) == 3)
-
-    said = {topic: orjson.loads(payload) for topic, payload in heard.messages}
-    assert said["/iveg/AGI/cmd"] == {"cmd": {"stop": {"id": "01A", "by": "x"}}}
-    assert said["/AGI/iveg/desired"] == {"desired": "stopped", "ids": ["01A"]}
-    assert said["/AGI/mqtt_feedback"]["robot_id"] == "AGI"
 
 
 async def test_a_robot_that_reconnects_finds_the_level_and_no_old_command() -> None:

@@ -126,9 +126,6 @@ def test_algorithm_1s_single_payload_is_accepted() -> None:
     assert (seen.frame_id, seen.probability) == ("map", 0.91)
 
 
-# --- scans ------------------------------------------------------------------------
-
-
 # --- stamps -----------------------------------------------------------------------
 
 

@@ -8,6 +8,5 @@ export const SENSORS = /** @type {const} */ ([
     name: "battery",
     shown: "percentage",
     flags: ["charging"],
-    gauge: null,
   },
 ]);

@@ -14,7 +14,6 @@ import { fill, make, setText } from "./dom.js";
  * @typedef {object} Reading
  * @property {string} label
  * @property {string} said a dash for an unknown value, so that cards keep their height
- * @property {{least: number, most: number, level: number} | null} gauge
  */
 
 /** Every row.
@@ -25,21 +24,14 @@ export function readingsOf(robot, i18n) {
     const label = i18n.t(`robot.${sensor.name}`);
     const read = /** @type {Quantities | null | undefined} */ (robot?.[sensor.name]);
     const level = read?.[sensor.shown];
-    if (!read || typeof level !== "number") return { label, said: "—", gauge: null };
-    const said = i18n.t(keyOf(sensor, read), { level });
-    return { label, said, gauge: gaugeOf(sensor, level) };
+    if (!read || typeof level !== "number") return { label, said: "—" };
+    return { label, said: i18n.t(keyOf(sensor, read), { level }) };
   });
 }
 
 /** @param {Sensor} sensor @param {Quantities} read */
 function keyOf({ name, flags }, read) {
   return `robot.${name}_${flags.find((flag) => read[flag]) ?? "level"}`;
-}
-
-/** @param {Sensor} sensor @param {number} level @returns {Reading["gauge"]} */
-function gaugeOf({ gauge }, level) {
-  const bounds = /** @type {readonly number[] | null} */ (gauge);
-  return bounds && { least: bounds[0], most: bounds[1], level };
 }
 
 /**
@@ -50,28 +42,15 @@ function gaugeOf({ gauge }, level) {
  * @param {I18n} i18n
  */
 export function drawReadings(place, robot, i18n) {
-  fill(place, readingsOf(robot, i18n), makeRow, (row, { label, said, gauge }) => {
+  fill(place, readingsOf(robot, i18n), makeRow, (row, { label, said }) => {
     const [name, value] = row.querySelectorAll("span");
     setText(name, label);
     setText(value, said);
-    drawGauge(row, gauge, label);
   });
-}
-
-/** @param {Element} row @param {Reading["gauge"]} gauge @param {string} label */
-function drawGauge(row, gauge, label) {
-  const meter = row.querySelector("meter");
-  if (!meter) return;
-  meter.hidden = gauge === null;
-  if (gauge === null) return;
-  meter.ariaLabel = label;
-  [meter.min, meter.max, meter.value] = [gauge.least, gauge.most, gauge.level];
 }
 
 function makeRow() {
   const row = make("p", "card__line");
-  const meter = make("meter", "card__meter");
-  meter.hidden = true;
-  row.append(make("span", "card__label"), " ", meter, make("span"));
+  row.append(make("span", "card__label"), " ", make("span"));
   return row;
 }
