@@ -1,6 +1,5 @@
 """Words that nobody knows: who is slow for them, and who is asked."""
 
-from dataclasses import replace
 
 import pytest
 
@@ -27,26 +26,6 @@ def test_a_number_or_nothing_as_class_is_a_frame_not_whole(word: str) -> None:
     desk.look("AGI", detection(word, 4.0))
 
     assert factors(desk) == [0.5, 0.5]
-
-
-@pytest.mark.parametrize("word", ["0: person", "persona", "people", "person_0"])
-def test_a_person_in_another_writing_has_a_ring(word: str) -> None:
-    desk = parked()
-
-    desk.look("AGII", detection(word, 1.0, probability=0.95))
-
-    assert desk.evaluator.speed_limits["AGI"].reason == "person"
-
-
-def test_a_number_is_a_person_by_the_class_list_of_the_fleet_file() -> None:
-    desk = parked()
-    robot = desk.world.robot("AGII")
-    robot.description = replace(robot.description, classes=("person", "tractor"))
-
-    desk.look("AGII", detection("0", 1.0), detection("1", 1.0))
-
-    assert desk.evaluator.speed_limits["AGI"].reason == "person"
-    assert robot.detector.words["AGII"].unknown == {}
 
 
 async def test_an_unknown_word_is_asked_once_and_slows_nobody_where_others_are() -> (
