@@ -2,8 +2,8 @@
 
 ``World.apply`` takes one observation; older ones and twins change nothing and are
 counted.  Nothing here reads a clock: ages come from the ``now`` that is handed in.
-Beside it stands what it judges by: the ledger of feedback, whose echoes prove ages; the
-transport that feeds each robot; what contradicts physics; and other servers' feedback.
+Beside it stands what it judges by: the ledger of feedback, whose echoes prove ages;
+what contradicts physics; and other servers' feedback.
 """
 
 from bisect import bisect_right
