@@ -394,7 +394,7 @@ MUTANTS = (
     ),
     Mutant(
         "clear: a pose and a twist that contradict each other are believed",
-        "robot.doubts.contradicted(code, received.at, LASTED_S)",
+        "self._doubt(robot, moved, at, LASTED_S)",
         "pass",
         ("unit/domain/test_contradictions.py",),
     ),

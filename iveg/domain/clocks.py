@@ -8,7 +8,7 @@ nobody sets.
 """
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from iveg.domain.limits import LIMITS
@@ -190,11 +190,7 @@ class RobotClock:
 
     def _against_direct(self, origin: Origin, now: float) -> float | None:
         """The delay against the fastest direct message, while there are such (s)."""
-        direct = max(
-            (one for boot, one in self._direct() if boot == origin.boot),
-            key=lambda one: one.seen_at,
-            default=None,
-        )
+        direct = self._newest_direct(lambda boot: boot == origin.boot)
         if direct is None or origin.stamp_s is None or direct.least is None:
             return None
         beyond = now - origin.stamp_s - direct.least
@@ -203,16 +199,20 @@ class RobotClock:
             return None
         return max(0.0, beyond)
 
-    def _direct(self) -> Iterator[tuple[str | None, ClockFilter]]:
-        """Boot and filter of what came past FIWARE, detectors apart."""
-        for (transport, boot, kind), one in self._filters.items():
-            if transport != FIWARE.id and kind is not DetectionFrame:
-                yield boot, one
+    def _newest_direct(
+        self, is_wanted: Callable[[str | None], bool]
+    ) -> ClockFilter | None:
+        """The filter, of wanted boots, that a message past FIWARE came to last."""
+        direct = (
+            one
+            for (transport, boot, kind), one in self._filters.items()
+            if transport != FIWARE.id and kind is not DetectionFrame and is_wanted(boot)
+        )
+        return max(direct, key=lambda one: one.seen_at, default=None)
 
     def offset_s(self, now: Instant) -> float | None:
         """Lag of the robot's clock behind ours (s), by direct messages alone."""
-        direct = (one for _, one in self._direct())
-        newest = max(direct, key=lambda one: one.seen_at, default=None)
+        newest = self._newest_direct(lambda _: True)
         if newest is None or newest.least is None:
             return None
         return newest.least + now.wall - now.mono

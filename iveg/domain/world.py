@@ -2,8 +2,8 @@
 
 ``World.apply`` takes one observation; older ones and twins change nothing and are
 counted.  Nothing here reads a clock: ages come from the ``now`` that is handed in.
-Beside it stands what it judges by: the ledger of feedback, whose echoes prove ages; the
-transport that feeds each robot; what contradicts physics; and other servers' feedback.
+Beside it stands what it judges by: the ledger of feedback, whose echoes prove ages;
+what contradicts physics; and other servers' feedback.
 """
 
 from bisect import bisect_right
@@ -362,36 +362,35 @@ class World:
                 seen_at = at.mono - (likely or 0.0)
             robot.sighted_at = dated(at, seen_at)
         if verdict == "new":
-            self._doubt(robot, received)
-            self._note_authors(received)
-            apply_newest(robot, received, self._measured_at(origin, received, likely))
-            self._doubt_motion(robot, received)
+            self._take(robot, received, self._measured_at(origin, received, likely))
         return verdict
 
-    def _doubt(self, robot: RobotState, received: Received) -> None:
-        """Note what contradicts the robot's state; recordings may jump as they like."""
-        if robot.is_replay or received.asked:
-            return
-        for code in self._plausibility.contradictions(robot, received):
-            robot.doubts.contradicted(code, received.at)
-            self.counters[f"contradicted.{code}"] += 1
+    def _take(
+        self, robot: RobotState, received: Received, moment: float | None
+    ) -> None:
+        """Take the newest of its kind in, and note what it contradicts.
 
-    def _note_authors(self, received: Received) -> None:
-        """Note whose feedback a robot hears beside ours."""
+        A recording may jump as it likes, and Orion's answer is of any time.
+        """
+        at, origin = received.at, received.observation.origin
+        is_checked = not (robot.is_replay or received.asked)
         if not received.asked:
-            said, is_direct = received.observation, received.transport != FIWARE.id
-            self.other_authors.note(
-                said.robot_id, said.origin, received.at, is_direct=is_direct
-            )
+            is_direct = received.transport != FIWARE.id
+            self.other_authors.note(robot.robot_id, origin, at, is_direct=is_direct)
+        if is_checked:
+            for code in self._plausibility.contradictions(robot, received):
+                self._doubt(robot, code, at)
+        apply_newest(robot, received, moment)
+        moved = robot.motion(at).contradiction
+        if is_checked and moved and isinstance(received.observation, Odometry):
+            self._doubt(robot, moved, at, LASTED_S)
 
-    def _doubt_motion(self, robot: RobotState, received: Received) -> None:
-        """Note what a robot's odometry contradicts in itself, which takes a while."""
-        if robot.is_replay or received.asked:
-            return
-        code = robot.motion(received.at).contradiction
-        if code is not None and isinstance(received.observation, Odometry):
-            robot.doubts.contradicted(code, received.at, LASTED_S)
-            self.counters[f"contradicted.{code}"] += 1
+    def _doubt(
+        self, robot: RobotState, code: str, at: Instant, lasted_s: float = 0.0
+    ) -> None:
+        """Note what a robot says that contradicts itself or physics."""
+        robot.doubts.contradicted(code, at, lasted_s)
+        self.counters[f"contradicted.{code}"] += 1
 
     def _hear(self, robot: RobotState, origin: Origin, at: Instant) -> None:
         """Note that a robot speaks; its next boot puts its detector back in service."""

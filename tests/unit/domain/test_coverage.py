@@ -1,4 +1,4 @@
-"""Issue 13.21: what nobody sees, and when somebody last looked there."""
+"""Parts of the aisles that nobody sees, and when somebody last looked there."""
 
 from iveg.domain.coverage import MOST_CELLS, AisleCoverage
 from iveg.domain.geometry import Rectangle

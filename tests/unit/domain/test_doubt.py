@@ -15,14 +15,6 @@ def contradicted(*moments: float) -> Doubts:
     return doubts
 
 
-def test_one_contradiction_is_no_doubt() -> None:
-    assert contradicted(1.0).active(at(1.9)) == ()
-
-
-def test_what_contradicts_for_longer_than_a_round_trip_is_doubted() -> None:
-    assert contradicted(1.0, 1.3, 1.6).active(at(1.6)) == ("jump",)
-
-
 @pytest.mark.parametrize(("later", "doubted"), [(2.5, True), (2.7, False)])
 def test_a_doubt_ends_after_a_second_of_consistency(
     later: float, *, doubted: bool

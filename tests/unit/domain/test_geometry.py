@@ -13,10 +13,6 @@ QUARTER = math.pi / 2
 BOX = Rectangle(1.0, 1.0, 2.0, 3.0)
 
 
-def test_a_point_ahead_of_a_robot_that_looks_left_is_to_the_north() -> None:
-    assert Pose2D(1.0, 2.0, QUARTER).transform(3.0, 0.0) == pytest.approx((1.0, 5.0))
-
-
 @pytest.mark.parametrize(
     ("segment", "crosses"),
     [

@@ -4,19 +4,9 @@ import pytest
 
 from iveg.domain.observations import Origin
 from iveg.domain.stream_order import StreamOrder
-from tests.builders import START, origin
+from tests.builders import origin
 
 YEARS_S = 5 * 365 * 86400.0
-
-
-def test_the_same_message_again_is_a_duplicate_and_an_older_one_late() -> None:
-    order = StreamOrder()
-    order.judge(origin(5))
-    order.judge(origin(7))
-
-    assert [order.judge(origin(seq)) for seq in (7, 5)] == ["duplicate"] * 2
-    assert order.judge(origin(6)) == "late"
-    assert order.seq == 7
 
 
 def test_the_newest_is_never_new_twice_however_many_late_ones_came_between() -> None:
@@ -65,11 +55,3 @@ def test_a_message_without_identity_is_new_by_arrival(nameless: Origin) -> None:
 
     assert [order.judge(nameless) for _ in range(2)] == ["new"] * 2
     assert order.seq == 7
-
-
-def test_a_stamp_years_off_orders_nothing() -> None:
-    order = StreamOrder()
-    order.judge(origin(1, wall=START.wall + YEARS_S))
-
-    assert order.judge(origin(2, wall=START.wall)) == "new"
-    assert order.judge(origin(1, wall=START.wall + 2 * YEARS_S)) == "duplicate"

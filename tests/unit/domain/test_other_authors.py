@@ -57,13 +57,6 @@ def test_an_earlier_boot_of_ours_says_nothing_more_and_is_none() -> None:
         assert field.found(0.1 * step) == []
 
 
-def test_boots_that_change_each_time_are_another_iveg_too() -> None:
-    field = Field()
-    for step in range(40):
-        field.say(0.1 * step, *[(f"b{step + n}", 1) for n in range(3)])
-    assert field.found(3.9) == ["b39", "b40", "b41"]
-
-
 def test_a_count_of_our_own_boot_that_we_never_sent_is_another_iveg() -> None:
     field = Field()
     for step in range(40):
@@ -108,10 +101,3 @@ def test_it_is_over_at_once_when_robots_have_forgotten_it() -> None:
         field.say(0.1 * step, ("other", step))
     field.say(4.0)
     assert field.found(4.0) == []
-
-
-def test_our_own_echo_proves_the_age_behind_another_author() -> None:
-    field = Field()
-    field.say(0.0, ("other", 1))
-    field.say(5.0, ("other", 2))
-    assert field.world.robot("AGI").age_s(at(5.0)) == 0.0

@@ -77,15 +77,6 @@ def test_no_robot_goes_farther_than_its_drive_takes_it(
     assert codes(world) == found
 
 
-def test_messages_that_come_together_are_judged_by_the_robots_own_clock() -> None:
-    world = house()
-    for number in range(4):
-        moment = origin(number, after=1.0 * number)
-        said = odometry("AGI", 10.0 + number, 10.0, origin=moment)
-        world.apply(received(said, after=9.0))
-    assert codes(world) == set()
-
-
 def test_a_clock_that_tells_hours_between_two_messages_excuses_no_jump() -> None:
     world = house()
     say(world, 0.0)

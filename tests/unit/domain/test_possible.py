@@ -26,23 +26,6 @@ def looked(
         scene.look("AGI", person(x, probability=chance))
 
 
-@pytest.mark.parametrize(
-    ("chances", "every_s"),
-    [
-        ((0.49, 0.7), LOOK_S),
-        ((0.7, 0.7, 0.7), 0.1),
-        ((0.7, 0.7, 0.7), 1.1),
-        ((0.6, 0.6, 0.6), LOOK_S),
-    ],
-    ids=["too faint", "one moment", "too slow", "not sure together"],
-)
-def test_less_is_nobody(chances: tuple[float, ...], every_s: float) -> None:
-    scene = Scene(rule=ON)
-    looked(scene, *chances, every_s=every_s)
-
-    assert scene.everyone == []
-
-
 def test_a_weak_box_moves_no_ring_of_a_sure_one() -> None:
     scene = Scene(rule=ON)
     looked(scene, 0.85)

@@ -31,7 +31,6 @@ from tests.builders import (
     at,
     detection_frame,
     fleet_of,
-    hold,
     odometry,
     origin,
     received,
@@ -337,22 +336,31 @@ def test_what_orion_kept_of_an_earlier_boot_does_not_displace_the_present_one() 
 # --- what a message changes -------------------------------------------------------
 
 
-def test_the_same_message_by_the_other_transport_changes_only_the_count() -> None:
+def test_the_newest_by_count_wins_whatever_brought_it() -> None:
     world = World(["AGI"])
-    world.apply(received(safety_report("AGI", hold()), transport=DIRECT.id))
-
-    world.apply(received(safety_report("AGI"), after=1.0, transport=FIWARE.id))
-
+    verdicts = [
+        world.apply(
+            received(odometry(x=float(seq), origin=origin(seq)), transport=transport)
+        )
+        for transport, seq in (
+            (DIRECT.id, 2), (FIWARE.id, 1), (FIWARE.id, 2), (FIWARE.id, 3),
+            (DIRECT.id, 3),
+        )
+    ]  # fmt: skip
     robot = world.robot("AGI")
-    assert robot.safety is not None
-    assert robot.safety.holds == (hold(),)
-    assert world.counters["SafetyReport.duplicate"] == 1
+
+    assert verdicts == ["new", "late", "duplicate", "new", "duplicate"]
+    assert robot.odometry is not None
+    assert robot.odometry.pose.x == 3.0
+    assert robot.odometry_transport == FIWARE.id
 
 
-def test_each_kind_of_message_has_an_order_of_its_own() -> None:
-    world = world_with(odometry(origin=origin(900)), safety_report(origin=origin(1)))
-
-    assert world.robot("AGI").safety is not None
+def test_a_robot_without_a_count_is_read_directly_while_that_works() -> None:
+    world = World(["AGI"])
+    blank = odometry(origin=Origin())
+    assert world.apply(received(blank, after=0.0, transport=DIRECT.id)) == "new"
+    assert world.apply(received(blank, after=0.9, transport=FIWARE.id)) == "duplicate"
+    assert world.apply(received(blank, after=1.1, transport=FIWARE.id)) == "new"
 
 
 def test_a_robot_outside_the_fleet_is_refused() -> None:

@@ -22,16 +22,3 @@ def test_a_twist_above_the_profile_frees_nobody_and_ends_no_slow_down(
         scene.look("AGII")
         factors.append(scene.judge()["AGI"].speed_factor)
     assert set(factors) == {0.5}
-
-
-@pytest.mark.parametrize("speed", [50.0, 1e9, -50.0])
-def test_a_robot_with_such_a_twist_is_slow_though_nobody_is_near(speed: float) -> None:
-    scene = Scene()
-    for tenth in range(20):
-        scene.now = tenth / 10
-        scene.drive("AGI", 0.0, linear=speed)
-        scene.drive("AGII", 50.0, 60.0, linear=0.0)
-        scene.look("AGI")
-        scene.look("AGII")
-        limit = scene.judge()["AGI"]
-    assert (limit.speed_factor, limit.reason) == (0.5, "doubt")

@@ -133,19 +133,6 @@ def test_a_person_in_a_frame_that_nobody_described_is_not_placed_but_counted() -
     )
 
 
-def test_a_thing_in_a_frame_that_nobody_described_is_named_and_not_counted() -> None:
-    scene = scene_of("AGI")
-    scene.rule = replace(scene.rule, possible_people=False)
-    faint = replace(somebody("AGI", "map", "odom"), probability=0.6)
-
-    scene.look("AGI", Detection("tomato", 0.9, box_at(1.0, 0.0), "odom"), faint)
-
-    assert (scene.people.unplaced, scene.people.unknown_frames) == (
-        0,
-        frozenset({"odom"}),
-    )
-
-
 def test_somebody_seen_by_a_robot_without_a_pose_is_without_a_place() -> None:
     scene = Scene()
 

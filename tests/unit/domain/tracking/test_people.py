@@ -148,16 +148,6 @@ def test_a_robot_is_not_told_of_itself() -> None:
     assert placed.peer is None
 
 
-def test_a_person_next_to_a_peer_is_still_a_person() -> None:
-    scene = Scene()
-    scene.drive("AGII", 5.0)
-
-    (placed,) = scene.look("AGI", person(5.0))
-
-    assert placed.peer is None
-    assert len(scene.everyone) == 1
-
-
 # --- ages -------------------------------------------------------------------------
 
 
@@ -190,12 +180,3 @@ def test_f46_the_ring_of_somebody_whose_observer_died_grows_to_six_metres() -> N
     assert radii == pytest.approx([2.0, 3.6, 6.0])
     assert list(known.zone_radii(scene.rule, at(10.0)))
     assert not list(known.zone_radii(scene.rule, at(10.01)))
-
-
-def test_who_is_gone_is_forgotten() -> None:
-    scene = Scene()
-    scene.look("AGI", person(3.0))
-
-    assert scene.people.forget(at(59.0)) == []
-    assert [one.person_id for one in scene.people.forget(at(61.0))] == ["P1"]
-    assert scene.everyone == []
