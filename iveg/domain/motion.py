@@ -61,8 +61,8 @@ class Motion:
         contradiction: Fields of its odometry that contradict each other.
         course: Direction in ``map`` in which the pose goes on (rad); None: as the twist
             says.
-        jumped: A step of place or heading stands out, so nobody knows yet whether the
-            robot goes on.
+        displaced: The pose was farther than 0.10 m away within the last second, by
+            motion, noise or a jump: nobody knows yet whether the robot goes on.
     """
 
     speed: float = 0.0
@@ -71,7 +71,7 @@ class Motion:
     contradiction: Contradiction | None = None
     pose_moves: bool = False
     course: float | None = None
-    jumped: bool = False
+    displaced: bool = False
 
     def ahead(self, pose: Pose2D, twist: Twist2D) -> tuple[Pose2D, Twist2D]:
         """Pose and twist to go on with from odometry, at the measured speed."""
@@ -214,9 +214,10 @@ def _shown_by(samples: Sequence[_Sample]) -> Motion:
     course = None
     if place.rate and contradiction in ("pose_against_twist", "sideways"):
         course = math.atan2(place.dy, place.dx)
-    jumped = any(
-        math.hypot(b.x - a.x, b.y - a.y) > LIMITS.standing_moved
-        for a, b in (steps[number] for number in place.jumps)
+    newest = samples[-1]
+    displaced = any(
+        math.hypot(newest.x - one.x, newest.y - one.y) > LIMITS.standing_moved
+        for one in samples
     )
     return Motion(
         place.rate,
@@ -225,7 +226,7 @@ def _shown_by(samples: Sequence[_Sample]) -> Motion:
         contradiction=contradiction,
         pose_moves=moves,
         course=course,
-        jumped=jumped,
+        displaced=displaced,
     )
 
 

@@ -7,7 +7,7 @@ poses are, how often they come and which are lost.
 from dataclasses import dataclass
 from random import Random
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from iveg.domain.geometry import Pose2D, Twist2D
@@ -111,7 +111,9 @@ def test_a_robot_whose_pose_goes_on_is_not_standing_for_longer_than_seconds(
 
 
 @given(streams, st.floats(0.2, 1.5))
-def test_a_standstill_ends_within_a_metre_or_two_seconds_of_a_pose_that_goes_on(
+# Its steps look like jumps and noise now and then.
+@example(Stream(hz=5, says=0.0, jitter_m=JITTER_M, loss=0.0, seed=1846), 0.25)
+def test_a_standstill_ends_within_two_seconds_of_a_pose_that_goes_on_and_for_good(
     stream: Stream, speed: float
 ) -> None:
     held = Held(stream)
@@ -119,10 +121,10 @@ def test_a_standstill_ends_within_a_metre_or_two_seconds_of_a_pose_that_goes_on(
         held.step(number, 0.0)
     assert held.bench.state == "STANDING"
 
-    for number in range(80, 80 + (40 if stream.hz > 2 else 60)):
+    for number in range(80, 240):
         held.step(number, speed)
-
-    assert held.bench.state != "STANDING"
+        if number >= 80 + (40 if stream.hz > 2 else 60):
+            assert held.bench.state != "STANDING"
 
 
 @given(streams, st.lists(st.floats(0.2, 3.0), min_size=3, max_size=3))

@@ -134,7 +134,7 @@ class Standstill:
         self._moving_samples = 0
         self._moved: tuple[Moment, float] | None = None
         """The newest sample of odometry whose wheels moved, and its arrival (s)."""
-        self._place_moved_at = self._jumped_at = -inf
+        self._place_moved_at = self._displaced_at = -inf
         self._reports, self._odometry = TopicOrder(), TopicOrder()
 
     @property
@@ -165,7 +165,7 @@ class Standstill:
             rest.is_long
             and not self._wheels_moved(moment, at)
             and not self.place_moves(at)
-            and (self._stood is not None or at.mono - self._jumped_at > WINDOW_S)
+            and (self._stood is not None or at.mono - self._displaced_at > WINDOW_S)
         )
         if is_standstill and self._stood is None:
             self._stood = rest.began, rest.since
@@ -200,8 +200,7 @@ class Standstill:
         if self._is_before_the_rest(moment, at.mono - age_s):
             return None
         self._place_moved_at = at.mono if motion.pose_moves else -inf
-        if motion.jumped:
-            self._jumped_at = at.mono
+        self._displaced_at = at.mono if motion.displaced else -inf
         self._moving_samples += 1
         if max(abs(twist.linear_x), abs(twist.angular_z)) < LIMITS.standing_speed:
             self._moving_samples = 0
