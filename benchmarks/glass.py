@@ -162,6 +162,8 @@ def measure(browser: Browser, side: str, robots: int, scene: str, how: How) -> R
         context = browser.new_context(viewport={"width": 1280, "height": 900})
         page = context.new_page()
         page.goto(place.link)
+        # The page of the link posts its token, and goes on.
+        page.wait_for_url(lambda url: "/signin" not in url)
         for _ in range(how.pages - 1):
             context.new_page().goto(page.url)
         page.bring_to_front()

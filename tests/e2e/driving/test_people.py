@@ -60,7 +60,7 @@ def test_what_an_admin_sees_is_accessible_and_who_is_ended_while_watching_is_out
     expect(eva.locator("body")).to_have_attribute("data-connection", "signed-out")
     expect(row).to_have_count(0)
     stopped = eva.context.request.post(
-        f"{stack.url}/api/v1/robots/AGI/stop", headers=_own(stack), max_retries=AGAIN
+        f"{stack.url}/api/v1/robots/AGI/stop", headers=stack.own_page, max_retries=AGAIN
     )
     assert stopped.status == 401
 
@@ -80,16 +80,23 @@ def test_the_link_signs_in_and_its_token_is_sent_in_no_address(
         assert not [url for url in asked if token in url.partition("#")[0]]
 
 
+def test_a_link_of_earlier_versions_signs_in_by_the_page(
+    stack: Site, browser: Browser
+) -> None:
+    with closing(browser.new_context(base_url=stack.url)) as context:
+        page = context.new_page()
+        page.goto(f"/?token={stack.settings['IVEG_SIGN_IN_TOKEN']}")
+
+        expect(page.locator("#mark")).to_have_attribute("data-state", "open")
+        assert page.url == f"{stack.url}/"
+
+
 def _begin(page: Page, stack: Site, invitation: str) -> int:
     """Status of the answer to an invitation, taken in this page's browser."""
     proof = {"invitation": invitation, "password": "berenjena-77"}
-    headers = _own(stack)
     request = page.context.request
-    return request.post(f"{stack.url}/signin", data=proof, headers=headers).status
-
-
-def _own(stack: Site) -> dict[str, str]:
-    return {"X-IVEG": "1", "Origin": stack.url}
+    answer = request.post(f"{stack.url}/signin", data=proof, headers=stack.own_page)
+    return answer.status
 
 
 def _wrong(page: Page, route: str, shoot: Callable[[Page, str], None]) -> list[object]:

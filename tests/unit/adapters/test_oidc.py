@@ -211,3 +211,11 @@ async def test_keyrock_tells_who_it_is_at_its_own_address(
 
     assert proof.subject == "ana-1"
     assert proof.claims["roles"] == KEYROCK["roles"]
+
+
+def test_nothing_that_is_secret_is_shown_by_a_traceback() -> None:
+    attempt = Attempt(BACK)
+    shown = repr((attempt, Client("https://a.test", CLIENT, SECRET, "")))
+
+    secret = (SECRET, attempt.state, attempt.nonce, attempt.verifier)
+    assert [one for one in secret if one in shown] == []

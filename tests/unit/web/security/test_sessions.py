@@ -56,6 +56,16 @@ def test_the_file_holds_digests_alone_and_only_its_owner_reads_it(
     assert path.stat().st_mode & 0o777 == 0o600
 
 
+def test_who_signed_out_is_not_back_after_a_restart(start: Restart) -> None:
+    sessions = start()
+    token = sessions.open("Ana", "operator")
+    who = sessions.find(token)
+
+    assert who is not None
+    sessions.end(who.session or b"")
+    assert start().find(token) is None
+
+
 def test_f42_the_time_that_iveg_was_down_counts_and_stop_is_left_for_twelve_hours(
     start: Restart, clock: FakeClock
 ) -> None:
