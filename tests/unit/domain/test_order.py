@@ -9,6 +9,16 @@ from tests.builders import origin
 YEARS_S = 5 * 365 * 86400.0
 
 
+def test_the_same_message_again_is_a_duplicate_and_an_older_one_late() -> None:
+    order = StreamOrder()
+    order.judge(origin(5))
+    order.judge(origin(7))
+
+    assert [order.judge(origin(seq)) for seq in (7, 5)] == ["duplicate"] * 2
+    assert order.judge(origin(6)) == "late"
+    assert order.seq == 7
+
+
 def test_the_newest_is_never_new_twice_however_many_late_ones_came_between() -> None:
     order = StreamOrder()
     order.judge(origin(1000))
