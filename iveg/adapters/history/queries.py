@@ -103,7 +103,7 @@ class Queries:
         *args: P.args,
         **named: P.kwargs,
     ) -> T:
-        """Answer of a question, such as ``speed_series`` of ``series``."""
+        """Answer of a question, such as ``series_of`` of ``series``."""
         work = partial(ask, self._engine, question, *args, **named)
         return await asyncio.get_running_loop().run_in_executor(self._threads, work)
 
