@@ -1,6 +1,5 @@
 """Words that nobody knows: who is slow for them, and who is asked."""
 
-
 import pytest
 
 from iveg.domain.words import WordAnswer
