@@ -106,6 +106,7 @@ def test_the_newest_of_a_peer_wins_and_an_older_one_is_dropped() -> None:
     [
         (payload(after=5.0), "from_the_future"),
         (payload(after=-5.0), "too_old"),
+        (payload().replace(b'"map"', b'"odom"'), "not_a_peer_scan"),
         (payload().replace(b'"x":0.0', b'"x":9.0', 1), "not_a_peer_scan"),
         (payload() + b" " * 1024, "too_large"),
         (orjson.dumps({**orjson.loads(payload()), "stamp": None}), "no_stamp"),
