@@ -149,7 +149,7 @@ MUTANTS = (
         "STOP: a restart asserts a hold that a release has named",
         "if self.hold_id in self.named:",
         "if self.hold_id in self.asked[1:]:",
-        ("unit/vital/test_command.py",),
+        ("properties/test_stop_transports.py",),
     ),
     Mutant(
         "rule: exactly the threshold is no longer enough",
@@ -299,13 +299,13 @@ MUTANTS = (
         "STOP: what an earlier boot reported acts",
         "return not present_boot.is_past(origin.boot, proven_at)",
         "return True",
-        ("unit/vital/test_earlier_boots.py",),
+        ("properties/test_earlier_boots.py",),
     ),
     Mutant(
         "freshness: a straggler of an earlier boot holds up the present one",
         "if proven_at is not None and proven_at > self._began and not self._is_proven:",
         "if False:",
-        ("unit/vital/test_earlier_boots.py",),
+        ("properties/test_earlier_boots.py",),
     ),
     Mutant(
         "STOP: motion from before the rest contradicts it when it comes late",

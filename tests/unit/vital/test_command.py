@@ -6,7 +6,7 @@ import pytest
 
 from iveg.domain.observations import Hold
 from iveg.domain.records import CommandEventRecord, CommandRecord
-from iveg.domain.stop import STEPS, DesiredRecord, FollowedCommand, StopMachine
+from iveg.domain.stop import DesiredRecord, FollowedCommand
 from iveg.domain.transports import DIRECT, FIWARE
 from tests.fakes.records import command_record
 from tests.unit.vital.desk import Desk, conditions_of, settle
@@ -18,19 +18,21 @@ async def press(desk: Desk, by: str = "ana") -> FollowedCommand:
     return command
 
 
-async def released(desk: Desk) -> str:
-    """A robot that stood and was released; returns the hold that it had."""
+async def standing() -> tuple[Desk, str]:
+    """A desk at which AGI was stopped and stands, and its hold."""
+    desk = Desk()
     command = await press(desk)
     await desk.stand()
-    held = command.command_id
-    await desk.commander.release("AGI", [held], "ana", desk.clock())
-    await settle()
-    desk.report("AGI", released=(held,))
-    await settle()
-    return held
+    return desk, command.command_id
 
 
-async def test_i5_both_transports_have_it_before_the_disk_is_asked() -> None:
+async def release(desk: Desk, held: str) -> FollowedCommand:
+    order = await desk.commander.release("AGI", [held], "ana", desk.clock())
+    await settle()
+    return order
+
+
+async def test_i5_both_transports_have_it_before_the_disk_and_the_press_after() -> None:
     desk = Desk()
     desk.journal.opened.clear()
 
@@ -41,14 +43,7 @@ async def test_i5_both_transports_have_it_before_the_disk_is_asked() -> None:
     assert len(desk.broker.asked) == 1
     assert not pressing.done()
     desk.journal.opened.set()
-    await pressing
-
-
-async def test_the_journal_has_it_before_the_press_is_accepted() -> None:
-    desk = Desk()
-
-    (command,) = await desk.commander.stop(["AGI"], "ana", desk.clock())
-
+    (command,) = await pressing
     assert desk.journal.lines == [("AGI", "stopped", command.command_id, "ana")]
 
 
@@ -92,15 +87,13 @@ async def test_a_failure_nobody_thought_of_is_logged_and_the_transport_is_tried_
 
 
 async def test_f41_reports_with_an_old_number_do_not_keep_it_standing() -> None:
-    desk = Desk()
-    command = await press(desk)
-    await desk.stand()
+    desk, held = await standing()
     for _ in range(20):
         desk.seq = 3
-        desk.report("AGI", Hold(command.command_id, "iveg", "remote"))
+        desk.report("AGI", Hold(held, "iveg", "remote"))
         await desk.wait(0.1)
 
-    assert desk.now(command).state == "STALE"
+    assert desk.commander.machine("AGI").state == "STALE"
 
 
 @pytest.mark.parametrize(
@@ -144,17 +137,13 @@ async def test_a_held_robot_that_moves_is_a_grave_alert_until_it_stands_again() 
 
 
 async def test_i6_a_release_goes_once_on_each_transport_and_names_its_attempt() -> None:
-    desk = Desk()
-    command = await press(desk)
-    await desk.stand()
+    desk, held = await standing()
     before = len(desk.fleet.stops)
 
-    once = await desk.commander.release(
-        "AGI", [command.command_id], "ana", desk.clock()
-    )
+    once = await release(desk, held)
     await desk.wait(1.9)
 
-    order = ("release", "AGI", (command.command_id,))
+    order = ("release", "AGI", (held,))
     assert [one for one in desk.broker.asked if one[0] == "release"] == [order]
     assert desk.fleet.asked == [order]
     assert desk.fleet.orders == desk.broker.orders
@@ -163,15 +152,10 @@ async def test_i6_a_release_goes_once_on_each_transport_and_names_its_attempt() 
 
 
 async def test_a_transport_that_hangs_does_not_hold_up_a_release_on_the_other() -> None:
-    desk = Desk()
-    command = await press(desk)
-    await desk.stand()
+    desk, held = await standing()
     desk.broker.opened.clear()
 
-    once = await desk.commander.release(
-        "AGI", [command.command_id], "ana", desk.clock()
-    )
-    await settle()
+    once = await release(desk, held)
 
     assert len(desk.fleet.asked) == 1
     assert desk.now(once).times.sent.get(DIRECT.id) is not None
@@ -194,20 +178,16 @@ async def test_13_7_an_order_was_sent_when_it_left_not_when_orion_says_so() -> N
 
 
 async def test_the_journal_knows_what_a_release_names_before_it_goes_out() -> None:
-    desk = Desk()
-    command = await press(desk)
-    await desk.stand()
+    desk, held = await standing()
     desk.journal.opened.clear()
 
-    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
-    await settle()
+    await release(desk, held)
     waiting = list(desk.fleet.asked)
     desk.journal.opened.set()
     await settle()
 
     assert waiting == []
     assert len(desk.fleet.asked) == 1
-    held = command.command_id
     challenge = desk.fleet.orders[0][0]
     assert desk.journal.named_lines == [("AGI", held, (held,), challenge)]
 
@@ -224,12 +204,10 @@ async def test_orions_204_while_the_agent_is_cut_off_is_unknown() -> None:
 
 
 async def test_a_release_that_orion_does_not_take_is_not_sent_again() -> None:
-    desk = Desk()
-    command = await press(desk)
-    await desk.stand()
+    desk, held = await standing()
     desk.broker.refuse()
 
-    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
+    await release(desk, held)
     await desk.wait(5.0)
 
     assert len([one for one in desk.broker.asked if one[0] == "release"]) == 1
@@ -237,14 +215,11 @@ async def test_a_release_that_orion_does_not_take_is_not_sent_again() -> None:
 
 
 async def test_the_journal_says_run_only_after_the_robot_reported_the_release() -> None:
-    desk = Desk()
-    command = await press(desk)
-    await desk.stand()
-    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
-    await settle()
+    desk, held = await standing()
+    await release(desk, held)
     assert [line[1] for line in desk.journal.lines] == ["stopped"]
 
-    desk.report("AGI", released=(command.command_id,))
+    desk.report("AGI", released=(held,))
     await settle()
 
     assert [line[1] for line in desk.journal.lines] == ["stopped", "run"]
@@ -294,13 +269,10 @@ async def test_what_a_crash_left_open_is_closed_and_says_what_became_of_it() -> 
 
 
 async def test_a_release_goes_out_when_its_audit_row_is_on_the_disk() -> None:
-    desk = Desk()
-    command = await press(desk)
-    await desk.stand()
+    desk, held = await standing()
     desk.sink.opened.clear()
 
-    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
-    await settle()
+    await release(desk, held)
     waiting = [what for what, _, _ in desk.broker.asked]
     desk.sink.opened.set()
     await settle()
@@ -310,11 +282,9 @@ async def test_a_release_goes_out_when_its_audit_row_is_on_the_disk() -> None:
 
 
 async def test_a_release_that_the_disk_held_up_for_too_long_never_goes_out() -> None:
-    desk = Desk()
-    command = await press(desk)
-    await desk.stand()
+    desk, held = await standing()
     desk.sink.opened.clear()
-    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
+    await release(desk, held)
     await desk.wait(2.1)
 
     desk.sink.opened.set()
@@ -346,22 +316,17 @@ async def test_a_broker_that_is_back_gets_every_level_again() -> None:
 
 
 async def test_i9_each_step_is_one_row_of_the_audit() -> None:
-    desk = Desk()
-    held = await released(desk)
+    desk, held = await standing()
+    await release(desk, held)
+    desk.report("AGI", released=(held,))
+    await settle()
     desk.report("AGI", factor=1.0, reason="clear", linear=0.3, released=(held,))
 
     steps = [
         one.state for one in desk.sink.records if isinstance(one, CommandEventRecord)
     ]
-    assert steps == [
-        "REQUESTED",
-        "SENT",
-        "DELIVERED",
-        "STANDING",
-        "RELEASING",
-        "READY",
-        "RUNNING",
-    ]
+    stopped = ["REQUESTED", "SENT", "DELIVERED", "STANDING"]
+    assert steps == [*stopped, "RELEASING", "READY", "RUNNING"]
 
 
 async def test_f38_fifty_presses_are_fifty_rows_and_one_episode() -> None:
@@ -376,22 +341,3 @@ async def test_f38_fifty_presses_are_fifty_rows_and_one_episode() -> None:
         *(f"joined by operator-{number}" for number in range(1, 50)),
     ]
     assert len({row.command_id for row in rows}) == 1
-
-
-async def test_a_step_that_the_table_lacks_is_told_and_counted_and_ends_nothing(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    desk = Desk()
-    rows = {row: step for row, step in STEPS.items() if row[1] != "unconfirmed"}
-    desk.commander.machines = {"AGI": StopMachine("AGI", steps=rows)}
-    await desk.commander.stop(["AGI"], "ana", desk.clock())
-
-    await desk.wait(3.0)
-    sent = len(desk.fleet.stops)
-    await desk.wait(1.0)
-
-    told = [line for line in caplog.records if "no step for" in line.message]
-    assert len(told) == 1
-    assert desk.commander.counters["stop.off_table"] >= 40
-    assert desk.commander.machine("AGI").wants_stop
-    assert len(desk.fleet.stops) > sent

@@ -165,46 +165,33 @@ async def test_the_end_of_a_crossing_ends_its_decision() -> None:
     assert newest.ended_at is not None
 
 
-async def test_a_robot_that_does_not_slow_down_raises_a_grave_alert() -> None:
-    desk = watched(Desk())
-    for number in range(22):
-        meet(desk)
-        desk.drive("AGI", 0.08 * number, linear=0.8)
-        desk.drive("AGII", 50.0, linear=0.0)
-        desk.look("AGI")
-        await desk.wait(0.1)
-
-    assert "alert.person_not_slowing" in conditions_of(desk)
-    assert "log.alert.raised" in desk.sentences()
-
-
 def stored_verdicts(desk: Desk) -> set[str]:
     """Verdicts of the newest row of the newest decision."""
     newest = desk.records(DecisionRecord)[-1]
     return {one["verdict"] for one in newest.links}
 
 
-async def test_the_stored_decision_says_missing_as_soon_as_it_is() -> None:
+async def drive_on(desk: Desk) -> None:
+    """AGI drives on at 0.8 m/s and is heard; it reports nothing."""
+    for number in range(25):
+        desk.drive("AGI", 0.08 * number, linear=0.8)
+        meet(desk)
+        await desk.wait(0.1)
+
+
+async def test_a_robot_that_does_not_slow_is_a_grave_alert_and_stored_as_missing() -> (
+    None
+):
     desk = watched(Desk())
     meet(desk)
     assert "open" in stored_verdicts(desk)
 
-    for number in range(6):
-        desk.drive("AGI", 0.36 * number, linear=0.8)
-        meet(desk)
-        await desk.wait(0.45)
+    await drive_on(desk)
 
     assert "alert.person_not_slowing" in conditions_of(desk)
+    assert "log.alert.raised" in desk.sentences()
     assert desk.evaluator.decisions.open
     assert stored_verdicts(desk) == {"ok", "missing"}
-
-
-async def drive_on(desk: Desk, seconds: float) -> None:
-    """AGI drives on at 0.8 m/s, to and fro, and is heard; it reports nothing."""
-    for number in range(round(seconds / 0.1)):
-        desk.drive("AGI", 0.08 * number, linear=0.8)
-        meet(desk)
-        await desk.wait(0.1)
 
 
 def test_a_decision_that_is_open_when_iveg_goes_away_says_so() -> None:
@@ -235,15 +222,11 @@ def test_what_a_crash_left_open_is_closed_and_says_that_nobody_knows() -> None:
 async def test_what_this_run_has_open_is_left_alone() -> None:
     desk = watched(Desk())
     meet(desk)
-    await drive_on(desk, 2.5)
+    await drive_on(desk)
     decisions, alerts = desk.records(DecisionRecord), desk.records(AlertRecord)
     before = len(desk.sink.records)
 
-    desk.evaluator.close_earlier(
-        [one for one in decisions if isinstance(one, DecisionRecord)],
-        [one for one in alerts if isinstance(one, AlertRecord)],
-        desk.clock(),
-    )
+    desk.evaluator.close_earlier(decisions, alerts, desk.clock())
 
     assert alerts
     assert len(desk.sink.records) == before
@@ -270,27 +253,29 @@ def test_a_speed_change_is_told_with_who_saw_whom() -> None:
 
     line = desk.event_log.lines[-1]
     slots = line.slots
-    assert line.key == "log.speed_down.person"
+    assert (line.key, line.decision_id) == (
+        "log.speed_down.person",
+        speed_limit.decision_id,
+    )
     assert (slots["observer"], slots["distance"]) == ("AGII", 1.5)
+    # A ring that has not grown is not mentioned.
+    assert {"radius", "unseen"}.isdisjoint(slots)
 
 
-def test_a_long_sighting_is_one_line_and_two_rows_a_second() -> None:
-    desk = watched(Desk())
-    for _ in range(50):
-        desk.clock.now = round(desk.clock.now + 0.1, 6)
-        desk.look("AGII", detection("farmer", 80.0))
-
-    assert desk.sentences().count("log.detection") == 1
-    assert len(desk.records(DetectionRecord)) == 10
-
-
-def test_boxes_of_ever_new_things_are_one_line_and_two_rows_a_second() -> None:
+@pytest.mark.parametrize(
+    ("name", "boxes", "key"),
+    [("farmer", 1, "log.detection"), ("thing-{}-{}", 9, "log.detection_unmapped")],
+)
+def test_a_long_sighting_or_ever_new_things_are_one_line_and_two_rows_a_second(
+    name: str, boxes: int, key: str
+) -> None:
     desk = watched(Desk())
     for number in range(50):
         desk.clock.now = round(desk.clock.now + 0.1, 6)
-        desk.look("AGII", *(detection(f"thing-{number}-{n}", 80.0) for n in range(9)))
+        names = (name.format(number, box) for box in range(boxes))
+        desk.look("AGII", *(detection(one, 80.0) for one in names))
 
-    assert desk.sentences().count("log.detection_unmapped") == 1
+    assert desk.sentences().count(key) == 1
     assert len(desk.records(DetectionRecord)) == 10
 
 
@@ -306,19 +291,6 @@ def test_faint_and_unmapped_detections_are_never_silently_ignored(
     desk.look("AGII", detection(class_id, 80.0, probability=probability))
 
     assert desk.sentences()[-1] == key
-
-
-async def test_a_spot_that_was_looked_at_in_vain_has_no_zone() -> None:
-    desk = watched(Desk())
-    desk.look("AGI", detection("farmer", 4.0))
-    (person,) = desk.evaluator.people.known.values()
-    assert person.sightings
-    for _ in range(30):
-        await desk.wait(0.1)
-        desk.drive("AGI", 0.0, linear=0.0)
-        desk.look("AGI")
-
-    assert not any(one.sightings for one in desk.evaluator.people.known.values())
 
 
 def test_a_person_beyond_the_walls_slows_who_saw_them_and_is_told_as_doubtful() -> None:
@@ -344,12 +316,6 @@ def test_a_possible_person_is_told_as_such_where_the_rule_counts_them() -> None:
 
     assert desk.sentences().count("log.detection_faint") == 1
     assert desk.sentences().count("log.detection_possible") == 1
-    (line,) = [
-        one for one in desk.event_log.lines if one.key == "log.detection_possible"
-    ]
-    told = [line.slots[name] for name in ("looks", "least", "most", "over")]
-    assert told == [2, 0.68, 0.7, 0.3]
-    assert line.slots["probability"] == 0.8322
 
 
 def test_28_6_a_pose_is_kept_with_its_margin_while_that_is_measured() -> None:
@@ -414,13 +380,3 @@ def test_what_orion_kept_of_yesterday_makes_nobody_appear() -> None:
     )
 
     assert desk.evaluator.people.known == {}
-
-
-def test_f46_somebody_whose_observer_died_still_slows_who_comes_near() -> None:
-    desk = watched(Desk())
-    meet(desk, 5.5)
-    desk.clock.now = 2.9
-    desk.drive("AGI", 0.0)
-    desk.look("AGI")
-
-    assert desk.evaluator.speed_limits["AGI"].reason == "person"

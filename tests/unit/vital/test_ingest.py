@@ -28,17 +28,6 @@ def ingest() -> Ingest:
     return Ingest(World(("AGI", "AGII")), ignore, ignore)
 
 
-def test_what_arrives_leaves_in_the_same_order() -> None:
-    queue = ingest()
-    for seq in range(5):
-        queue.enqueue(received(odometry(origin=origin(seq))))
-
-    left = [one.observation for one in queue.drain()]
-
-    assert left == [odometry(origin=origin(seq)) for seq in range(5)]
-    assert list(queue.drain()) == []
-
-
 def test_of_one_robot_and_kind_the_newest_wait_and_the_others_are_counted() -> None:
     queue = ingest()
     for seq in range(MOST_WAITING + 10):
@@ -94,15 +83,6 @@ def test_an_unknown_robot_is_counted_each_time_and_logged_once(
     assert queue.counters["rejected.unknown_robot"] == 10
     assert told == [("AGX", "unknown_robot")]
     assert len(caplog.records) == 1
-
-
-async def test_who_waits_is_woken_by_what_arrives() -> None:
-    queue = ingest()
-    queue.enqueue(received(odometry()))
-
-    await queue.wait(timeout_s=60.0)
-
-    assert len(list(queue.drain())) == 1
 
 
 def test_what_was_asked_for_is_counted_apart_from_what_was_sent() -> None:

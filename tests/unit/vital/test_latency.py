@@ -4,18 +4,9 @@ import pytest
 
 from iveg.domain.latency import Segment, Sketch, merged
 from iveg.domain.observations import Received
-from iveg.domain.transports import DIRECT, FIWARE, TransportId
+from iveg.domain.transports import DIRECT, FIWARE
 from tests.builders import odometry
 from tests.unit.vital.desk import Desk
-
-
-def say(desk: Desk, *transports: TransportId, after_s: float = 0.0) -> None:
-    """One odometry of AGI, on each of the transports, the second so much later."""
-    told = odometry("AGI", origin=desk.next_origin())
-    for number, transport in enumerate(transports):
-        desk.clock.now += after_s if number else 0.0
-        desk.ingest.enqueue(Received(told, desk.clock(), transport))
-        desk.loop.step(desk.ingest.drain(), desk.clock())
 
 
 def took(desk: Desk, hop: Segment) -> Sketch:

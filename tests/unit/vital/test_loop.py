@@ -9,12 +9,10 @@ from typing import Any
 import pytest
 
 from iveg.domain.observations import (
-    CommandAnswer,
     HeartbeatProbe,
     Origin,
     Received,
 )
-from iveg.domain.transports import DIRECT, FIWARE
 from iveg.vital.evaluate import HEARTBEAT_S
 from iveg.vital.health_monitor import GRACE_S
 from iveg.vital.loop import TICK_S
@@ -110,19 +108,6 @@ def test_heartbeats_keep_their_pace_while_ticks_come_now_late_now_in_time() -> N
     assert heartbeats == pytest.approx(40 * TICK_S / HEARTBEAT_S, abs=1)
 
 
-
-
-async def test_the_second_transports_copy_of_an_answer_keeps_its_time() -> None:
-    desk = Desk()
-    (command,) = await desk.commander.stop(["AGI"], "ana", desk.clock())
-    await settle()
-    answer = CommandAnswer("AGI", Origin("b", 1), command.command_id, "LATCHED")
-    desk.hear(answer, DIRECT.id)
-    desk.clock.now = 0.3
-    desk.hear(answer, FIWARE.id)
-
-    assert desk.now(command).times.answered.get(DIRECT.id) is not None
-    assert desk.now(command).times.answered[FIWARE.id] == desk.clock()
 
 
 def test_the_heartbeat_that_came_back_is_evidence_for_the_chain() -> None:

@@ -47,35 +47,22 @@ async def test_a_copy_that_comes_after_the_release_stops_nothing() -> None:
     assert len(desk.journal.lines) == lines
 
 
-async def test_a_new_press_after_the_release_stops_again() -> None:
+@pytest.mark.parametrize(
+    ("by", "press_id", "later_s"),
+    [("ana", "p2", 0.0), ("ben", "p1", 0.0), ("ana", "p1", REMEMBERED_S + 0.1)],
+    ids=["another name", "another person", "the same name after a minute"],
+)
+async def test_another_press_after_the_release_stops_again(
+    by: str, press_id: str, later_s: float
+) -> None:
     desk = Desk()
     first = await press(desk)
     await released(desk)
+    desk.clock.now += later_s
 
-    again = await press(desk, press_id="p2")
+    again = await press(desk, by, press_id=press_id)
 
     assert again is not first
-    assert desk.commander.machine("AGI").wants_stop
-
-
-async def test_another_persons_press_of_the_same_name_is_another_press() -> None:
-    desk = Desk()
-    await press(desk)
-    await released(desk)
-
-    await press(desk, "ben")
-
-    assert desk.commander.machine("AGI").wants_stop
-
-
-async def test_a_name_that_comes_back_after_a_minute_is_a_new_press() -> None:
-    desk = Desk()
-    await press(desk)
-    await released(desk)
-    desk.clock.now += REMEMBERED_S + 0.1
-
-    await press(desk)
-
     assert desk.commander.machine("AGI").wants_stop
 
 
@@ -100,8 +87,6 @@ async def test_standstill_counts_from_the_finger_and_the_history_knows_it() -> N
 
     await desk.stand()
 
-    rows = [
-        one for one in desk.records(CommandRecord) if isinstance(one, CommandRecord)
-    ]
     assert desk.now(command).standstill_ms == pytest.approx(500.0, abs=1.0)
-    assert rows[-1].pressed_at == pytest.approx(START.wall - 0.5)
+    newest = desk.records(CommandRecord)[-1]
+    assert newest.pressed_at == pytest.approx(START.wall - 0.5)

@@ -1,22 +1,10 @@
 """A third way to the robots is one entry of the table: nothing else is told of it."""
 
 from iveg.domain.transports import Transport, TransportId
-from iveg.models.command import Command as CommandModel
 from tests.fakes.fleet import FakeFleet
 from tests.unit.vital.desk import Desk, settle
 
 DDS = Transport(TransportId("dds"), confirms=True)
-
-
-async def stopped(desk: Desk) -> str:
-    (command,) = await desk.commander.stop(["AGI"], "ana", desk.clock())
-    await settle()
-    return command.command_id
-
-
-def told(desk: Desk, command_id: str) -> CommandModel:
-    command = desk.commander.commands[command_id]
-    return CommandModel.of(command, desk.commander.machine("AGI"), desk.clock())
 
 
 async def test_a_release_goes_once_over_every_transport_that_can() -> None:
@@ -24,8 +12,10 @@ async def test_a_release_goes_once_over_every_transport_that_can() -> None:
     deaf = FakeFleet()
     only_stops = Transport(TransportId("radio"), can_release=False)
     desk = Desk(also={DDS: dds, only_stops: deaf})
-    hold_id = await stopped(desk)
+    (command,) = await desk.commander.stop(["AGI"], "ana", desk.clock())
+    await settle()
     await desk.stand()
+    hold_id = command.command_id
 
     order = await desk.commander.release("AGI", [hold_id], "ana", desk.clock())
     await settle()
