@@ -6,15 +6,19 @@ leaves them out.
 
 import os
 import socket
+import subprocess
+import sys
 
 import pytest
 
 pytest.importorskip("cyclonedds")
 
-from iveg.adapters.dds import Dds, DdsReader, DdsWriter
+from iveg.adapters.dds import Dds
 from iveg.adapters.dds_network import DdsNetwork
+from tests.bonds import bound
+from tests.processes import ROOT
 
-__all__ = ["Dds", "DdsNetwork", "DdsReader", "DdsWriter", "free_domain", "loopback"]
+__all__ = ["Dds", "DdsNetwork", "free_domain", "loopback", "start_stranger"]
 
 _BASE, _GAIN, _DOMAINS = 7400, 250, 100
 """RTPS: ports of domain d begin at 7400 + 250 d; above 100 Linux hands them out."""
@@ -42,3 +46,15 @@ def _is_free(port: int) -> bool:
 def loopback(domain: int) -> DdsNetwork:
     """A network that stays on this machine."""
     return DdsNetwork(domain, "127.0.0.1", ("127.0.0.1",))
+
+
+def start_stranger(node: str, domain: int) -> subprocess.Popen[str]:
+    """A process with a node of somebody else (``tests.integration.dds_stranger``)."""
+    program = (sys.executable, "-m", "tests.integration.dds_stranger")
+    return subprocess.Popen(
+        bound(*program, node, f"{domain}"),
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )

@@ -1,9 +1,5 @@
-"""Two processes over DDS, unicast on loopback: qualities of service, who is there."""
+"""DDS, unicast on loopback: qualities of service, who is there."""
 
-import os
-import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -16,9 +12,8 @@ from iveg.ros2 import messages as ros
 from iveg.ros2.cdr import type_hash
 from iveg.ros2.messages import Message
 from iveg.ros2.names import Qos
-from tests.bonds import bound
-from tests.dds import Dds, DdsNetwork, DdsReader, free_domain, loopback
-from tests.processes import ROOT, until
+from tests.dds import Dds, DdsNetwork, free_domain, loopback, start_stranger
+from tests.processes import until
 
 RELIABLE, BEST_EFFORT = names.DEFAULT, names.SENSOR_DATA
 KEPT = names.TF_STATIC
@@ -29,79 +24,70 @@ def domain() -> int:
     return free_domain()
 
 
-@pytest.fixture(scope="module")
-def talker(domain: int) -> Iterator[subprocess.Popen[bytes]]:
-    process = subprocess.Popen(
-        bound(sys.executable, "-m", "tests.integration.dds_talker", str(domain)),
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        start_new_session=True,
-    )
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.wait(10)
-
-
 @pytest.fixture
-def dds(domain: int, talker: subprocess.Popen[bytes]) -> Iterator[Dds]:
+def dds(domain: int) -> Iterator[Dds]:
     with Dds(loopback(domain)) as found:
         yield found
 
 
-def heard(reader: DdsReader) -> list[float] | None:
-    """Numbers that wait; None when there are none."""
-    found = [cdr.read(ros.Twist, one).linear.x for one in reader.take()]
-    return found or None
+@pytest.fixture
+def other(domain: int) -> Iterator[Dds]:
+    with Dds(loopback(domain)) as found:
+        yield found
 
 
 @pytest.mark.parametrize(
-    ("topic", "asked"),
+    ("offered", "asked"),
     [
-        ("/best_effort", BEST_EFFORT),
-        ("/reliable", BEST_EFFORT),
-        ("/reliable", RELIABLE),
-        ("/kept", KEPT),
+        (BEST_EFFORT, BEST_EFFORT),
+        (RELIABLE, BEST_EFFORT),
+        (RELIABLE, RELIABLE),
+        (KEPT, KEPT),
     ],
 )
 def test_a_reader_hears_a_writer_that_offers_what_it_asks(
-    dds: Dds, topic: str, asked: Qos
+    dds: Dds, other: Dds, offered: Qos, asked: Qos
 ) -> None:
-    reader = dds.reader(topic, ros.Twist, asked)
+    said = cdr.write(ros.Twist())
+    writer = other.writer("/heard", ros.Twist, offered)
+    writer.write(said)
+    reader = dds.reader("/heard", ros.Twist, asked)
 
-    found = until(lambda: heard(reader), f"a message on {topic}", 10.0)
+    def heard() -> list[bytes]:
+        if offered is not KEPT:
+            writer.write(said)
+        return reader.take()
 
-    assert found == sorted(found)
+    assert set(until(heard, "a message", 10.0)) == {said}
 
 
 @pytest.mark.parametrize(
-    ("topic", "asked"), [("/best_effort", RELIABLE), ("/reliable", KEPT)]
+    ("offered", "asked"), [(BEST_EFFORT, RELIABLE), (RELIABLE, KEPT)]
 )
-def test_a_reader_that_asks_for_more_than_is_offered_hears_nothing_and_shows_it(
-    dds: Dds, topic: str, asked: Qos
+def test_a_reader_that_asks_for_more_than_is_offered_is_not_met_and_shows_it(
+    dds: Dds, other: Dds, offered: Qos, asked: Qos
 ) -> None:
-    reader = dds.reader(topic, ros.Twist, asked)
-    other = dds.reader(topic, ros.Twist, BEST_EFFORT)
+    other.writer("/missed", ros.Twist, offered)
+    reader = dds.reader("/missed", ros.Twist, asked)
+    modest = dds.reader("/missed", ros.Twist, BEST_EFFORT)
 
-    until(lambda: heard(other), f"a message on {topic}", 10.0)
-    offered = next(one for one in dds.endpoints() if one.topic == topic and one.writes)
+    until(lambda: modest.writers, "one that asks for less is met", 10.0)
+    (met,) = (it for it in dds.endpoints() if it.topic == "/missed" and it.writes)
 
     assert reader.writers == 0
-    assert asked.lacks(offered.qos)
+    assert asked.lacks(met.qos)
 
 
-def test_a_message_of_another_layout_never_arrives(dds: Dds, domain: int) -> None:
+def test_a_message_of_another_layout_never_arrives(dds: Dds, other: Dds) -> None:
     """DDS checks payloads against the type before anybody reads them."""
-    with Dds(loopback(domain)) as other:
-        writer = other.writer("/short", ros.Twist, RELIABLE)
-        reader = dds.reader("/short", ros.Twist, RELIABLE)
-        until(lambda: writer.readers == 1 and reader.writers == 1, "both met")
+    writer = other.writer("/short", ros.Twist, RELIABLE)
+    reader = dds.reader("/short", ros.Twist, RELIABLE)
+    until(lambda: writer.readers == 1 and reader.writers == 1, "both met")
 
-        with pytest.raises(HopError):
-            writer.write(cdr.write(ros.Vector3()))
+    with pytest.raises(HopError):
+        writer.write(cdr.write(ros.Vector3()))
 
-        assert reader.take() == []
+    assert reader.take() == []
 
 
 @pytest.mark.parametrize(
@@ -164,13 +150,15 @@ def test_a_publisher_that_came_and_went_between_two_looks_is_told_once(
 
 
 def test_a_process_that_was_killed_is_gone_within_seconds(
-    dds: Dds, talker: subprocess.Popen[bytes]
+    dds: Dds, domain: int
 ) -> None:
-    until(lambda: bool(_topics(dds)), "the talker")
+    stranger = start_stranger("humble on this machine", domain)
+    until(lambda: "/cmd_vel" in _topics(dds), "it is met")
 
-    os.kill(talker.pid, signal.SIGKILL)
+    stranger.kill()
+    stranger.communicate()
 
-    until(lambda: not _topics(dds), "its writers are forgotten", 30.0)
+    until(lambda: "/cmd_vel" not in _topics(dds), "its writer is forgotten", 30.0)
 
 
 def _topics(dds: Dds) -> set[str]:

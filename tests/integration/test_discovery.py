@@ -1,8 +1,5 @@
 """Whoever starts after the gate is met: another publisher, and a late listener."""
 
-import os
-import subprocess
-import sys
 import time
 
 import pytest
@@ -12,9 +9,8 @@ from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.reading import InputFaults
 from iveg.ros2 import cdr, names
 from iveg.ros2 import messages as ros
-from tests.bonds import bound
-from tests.dds import Dds, DdsNetwork, free_domain
-from tests.processes import ROOT, until
+from tests.dds import Dds, DdsNetwork, free_domain, start_stranger
+from tests.processes import until
 
 _WITHIN_S = 8.0
 HERE = ("127.0.0.1",)
@@ -22,18 +18,6 @@ EVERYWHERE = ["jazzy", "humble", "jazzy on this machine", "humble on this machin
 NETWORK = next(
     (one for one in DdsNetwork().interfaces().values() if one not in HERE), ""
 )
-
-
-def start(node: str, domain: int) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        bound(
-            sys.executable, "-m", "tests.integration.dds_stranger", node, f"{domain}"
-        ),
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
-        text=True,
-    )
 
 
 @pytest.mark.parametrize(
@@ -58,7 +42,7 @@ def test_who_starts_after_the_gate_is_met_and_hears_it(
     with Dds(DdsNetwork(domain, interface, peers)) as gate:
         writer = gate.writer("/cmd_vel", ros.Twist, names.DEFAULT)
         assert not [one for one in gate.endpoints() if not one.own]
-        strangers = [start(node, domain) for node in nodes]
+        strangers = [start_stranger(node, domain) for node in nodes]
 
         def met() -> bool:
             writer.write(zero)
