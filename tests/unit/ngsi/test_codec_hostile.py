@@ -281,7 +281,6 @@ HEADER = {"boot": "b", "seq": 1, "stamp": "2026-11-21T03:31:20.000Z"}
         b"{",
         b'{"bounding_boxes": [NaN]}',
     ],
-    ids=str,
 )
 def test_a_frame_that_cannot_be_read_is_refused_and_never_an_empty_picture(
     said: object,
