@@ -9,13 +9,14 @@ from alembic.operations import Operations
 from alembic.runtime.migration import MigrationContext
 from sqlalchemy import Connection, create_engine
 
-from iveg.adapters.history.tables import metadata
+from iveg.adapters.history.tables import EARLIER, metadata
 
 
 def run(connection: Connection) -> None:
     context.configure(
         connection=connection,
         target_metadata=metadata,
+        include_name=lambda name, kind, _: kind != "table" or name not in EARLIER,
         transactional_ddl=True,
         render_as_batch=connection.dialect.name == "sqlite",
     )

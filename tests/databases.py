@@ -14,6 +14,8 @@ from sqlalchemy import Connection, MetaData, Table, insert
 from iveg.adapters.history.engine import sqlite_file, upgrade
 from iveg.adapters.history.recorder import Store
 from iveg.domain.accounts import Account, ApiToken, name_key
+from iveg.domain.records import Record
+from iveg.vital.record import Waiting
 
 
 def lay_history(database_url: str) -> None:
@@ -29,6 +31,14 @@ def _newest() -> bytes:
         file = Path(folder, "history.sqlite")
         upgrade(f"sqlite:///{file}")
         return file.read_bytes()
+
+
+def remember(url: str, *records: Record) -> None:
+    """Put rows into the history of this address, which is made where it is missing."""
+    lay_history(url)
+    store = Store(url)
+    store.write([Waiting(record, n, 0.0) for n, record in enumerate(records, 1)])
+    store.close()
 
 
 def put_into_tables(url: str, person: Account, program: ApiToken) -> None:

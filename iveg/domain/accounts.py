@@ -136,7 +136,6 @@ class Session:
         person: Id of the account; empty in sessions of earlier versions.
         method: How they signed in.
         until: When it is over at the latest (Unix s); None: no earlier than others.
-        wall: It was left to a screen that everybody passes.
     """
 
     digest: str
@@ -147,7 +146,6 @@ class Session:
     person: str = ""
     method: SignInMethod = "link"
     until: float | None = None
-    wall: bool = False
 
     @property
     def key(self) -> bytes:

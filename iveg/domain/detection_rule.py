@@ -16,7 +16,6 @@ Kind = Literal["alert", "faint", "other"]
 
 RECOVERED: Final = "recovered"
 """Author of a version that was made from what could be read of a damaged file."""
-"""Author of a version that was made since its last one lacks what all have now."""
 
 ALIASES: Mapping[str, Class] = {
     "person": "person",

@@ -14,7 +14,7 @@ from iveg.domain.accounts import (
 )
 from iveg.models.base import Model, Stamp
 
-SessionKind = Literal["link", "account", "wall"]
+SessionKind = Literal["link", "account"]
 
 
 class SignInCode(Model):
@@ -58,26 +58,17 @@ class OpenSession(Model):
     Its id lets nobody in.
 
     Attributes:
-        began_at: The sign-in; the last request.
+        kind: How they signed in.
+        began_at: The sign-in.
     """
 
     session_id: str
     name: str
     role: str = Field(description="That is left now; `expired`: STOP alone.")
-    kind: SessionKind = Field(description="`wall`: of a screen, it looks and stops.")
+    kind: SessionKind
     began_at: Stamp
     seen_at: Stamp = Field(description="The last request.")
     own: bool = Field(description="The one that asks.")
-
-
-class SessionsEnded(Model):
-    """Number of sessions that have ended.
-
-    Attributes:
-        ended: How many.
-    """
-
-    ended: int
 
 
 class UserAccount(Model):

@@ -14,7 +14,6 @@ from typing import Final
 from pydantic.json_schema import models_json_schema
 
 from iveg.domain.records import Json
-from iveg.models.access import SessionsEnded
 from iveg.models.base import Model
 from iveg.models.health import Recording
 from iveg.models.history import (
@@ -39,7 +38,6 @@ SHOWN: Final[tuple[type[Model], ...]] = (
     Measurement,
     Recording,
     Note,
-    SessionsEnded,
 )
 _HEAD: Final = """\
 # Resources

@@ -45,7 +45,7 @@ from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Store
-from iveg.adapters.history.tables import metadata
+from iveg.adapters.history.tables import EARLIER, metadata
 from iveg.domain.records import DecisionRecord, MeasurementRecord
 from iveg.models.dictionary import describe
 from iveg.models.docs import write_page
@@ -63,8 +63,11 @@ measurement = MeasurementRecord(
 store, queries = Store("sqlite:///history.sqlite"), Queries("sqlite:///history.sqlite")
 store.write([Waiting(decision, 1, 0.0), Waiting(measurement, 2, 0.0)])
 
+def is_ours(one, name, kind, *_):
+    return kind != "index" and name not in EARLIER
+
 def differences(connection):
-    opts = {"include_object": lambda one, name, kind, *_: kind != "index"}
+    opts = {"include_object": is_ours}
     context = MigrationContext.configure(connection, opts=opts)
     return [str(one) for one in compare_metadata(context, metadata)]
 

@@ -236,23 +236,6 @@ def test_the_bar_of_the_past_covers_no_stop_and_no_tool_of_the_map(
         expect(page.locator("#status-said")).to_contain_text("use la seta roja")
 
 
-def test_the_screen_of_a_wall_shows_nothing_to_press_but_stops(show: Show) -> None:
-    page = show(snapshot(6), language="en").page
-    page.locator(".user").click()
-    page.get_by_role("button", name="Wall display").click()
-    page.get_by_role("button", name="Begin").click()
-    page.wait_for_selector("body[data-wall]:not([data-panel])")
-    page.reload()
-    settle(page, "body[data-wall] #map-fit:enabled")
-    page.clock.run_for(4000)
-
-    gone = page.locator(".nav, .rearm .button, .card__menu, .user")
-    assert gone.count() > 0
-    assert [one for one in gone.all() if one.is_visible()] == []
-    expect(strip_stop(page, "fleet")).to_be_in_viewport(ratio=1)
-    assert evaluate(page, COVERED_STOPS) == []
-
-
 # --- the status line and cards --------------------------------------------------------
 
 

@@ -42,14 +42,6 @@ def driving(served: Site) -> Site:
 
 
 @pytest.fixture
-def demo(place: Site) -> Site:
-    """``iveg demo``: all of it under one parent."""
-    place.start("demo")
-    place.wait_until_live()
-    return place
-
-
-@pytest.fixture
 async def address(tmp_path: Path) -> AsyncIterator[BrokerAddress]:
     """Of a broker on a free port."""
     async with broker(tmp_path) as where:

@@ -10,19 +10,8 @@ from collections.abc import Iterator
 import httpx
 import pytest
 
-from tests.processes import Site, site
+from tests.processes import Site
 from tests.strangers import Field, Json, Stranger, box_about, strangers
-
-
-@pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    """FIWARE and iVeg, without robots."""
-    directory = tmp_path_factory.mktemp("clear")
-    with site(directory) as one:
-        one.start("fiware").wait_until_ready()
-        one.start("serve")
-        one.wait_until_served()
-        yield one
 
 
 def spoiled() -> Iterator[str | bytes]:
@@ -50,16 +39,16 @@ async def raised(field: Field, api: httpx.Client, key: str) -> None:
 
 @pytest.mark.slow
 async def test_f54_a_detector_that_cannot_be_read_lies_about_time_or_is_silent(
-    place: Site,
+    served: Site,
 ) -> None:
     watcher = Stranger("AGI", 10.0, 10.0)
     near = Stranger("AGII", 12.5, 10.0)
-    mqtt = place.settings["IVEG_MQTT_URL"]
+    mqtt = served.settings["IVEG_MQTT_URL"]
     async with strangers(mqtt, watcher, near) as field:
-        with place.api() as api:
+        with served.api() as api:
             await _unreadable_from_the_first_on(field, watcher, api)
             await _stamped_by_another_clock(field, watcher, api)
-            await _silent(field, watcher, near, place, api)
+            await _silent(field, watcher, near, api)
 
 
 async def _unreadable_from_the_first_on(
@@ -88,7 +77,7 @@ async def _stamped_by_another_clock(
 
 
 async def _silent(
-    field: Field, watcher: Stranger, near: Stranger, place: Site, api: httpx.Client
+    field: Field, watcher: Stranger, near: Stranger, api: httpx.Client
 ) -> None:
     watcher.boxes = None
     await field.until(lambda: field.factor("AGII") == 0.5, "AGII slow")

@@ -34,13 +34,12 @@ async def up() -> AsyncIterator[Running]:
 
 @pytest.fixture
 async def page() -> AsyncIterator[int]:
+    async def healthy(request: Request) -> Response:
+        known = request.path in ("/healthz", "/ngsi/notifications")
+        return Response(200 if known else 404)
+
     async with http_server(healthy, "127.0.0.1", 0) as port:
         yield port
-
-
-async def healthy(request: Request) -> Response:
-    known = request.path in ("/healthz", "/ngsi/notifications")
-    return Response(200 if known else 404)
 
 
 @pytest.fixture
@@ -104,37 +103,33 @@ async def test_behind_pep_proxies_all_is_well_until_one_of_them_refuses(
     assert {status for token, status in agent.seen if not token} == set()
 
 
-async def test_a_deaf_agent_is_found_though_it_says_that_all_is_well(
+async def test_a_deaf_agent_is_found_and_one_that_is_behind_says_how_late(
     up: Running, settings: Settings, tmp_path: Path
 ) -> None:
+    """Of both the agent's own port says that all is well."""
     fail(up, Faults(deaf=True))
-
-    findings = await find(settings, tmp_path, SHORT_S)
-
-    assert failed(findings) == {Hop.AGENT}
-    assert findings[Hop.AGENT].said == "nothing came in 1 s"
-
-
-async def test_an_agent_that_is_behind_is_well_and_says_how_late(
-    up: Running, settings: Settings, tmp_path: Path
-) -> None:
+    deaf = await find(settings, tmp_path, SHORT_S)
     fail(up, Faults(slow_s=1.4))
+    slow = await find(settings, tmp_path)
 
-    findings = await find(settings, tmp_path)
+    assert failed(deaf) == {Hop.AGENT}
+    assert deaf[Hop.AGENT].said == "nothing came in 1 s"
+    assert failed(slow) == set()
+    assert slow[Hop.AGENT].said.startswith("measures reach Orion 1.")
 
-    assert failed(findings) == set()
-    assert findings[Hop.AGENT].said.startswith("measures reach Orion 1.")
 
-
-async def test_a_dead_orion_leaves_the_broker_well(
+async def test_a_dead_orion_leaves_the_broker_well_and_no_history_is_made(
     settings: Settings, tmp_path: Path
 ) -> None:
-    dead = replace(settings, orion_url=f"http://127.0.0.1:{free_ports(1)[0]}")
+    file = tmp_path / "none.sqlite"
+    dead = f"http://127.0.0.1:{free_ports(1)[0]}"
+    bare = replace(settings, orion_url=dead, database_url=f"sqlite:///{file}")
 
-    findings = await find(dead, tmp_path)
+    findings = await find(bare, tmp_path)
 
-    assert failed(findings) == {Hop.ORION}
+    assert failed(findings) == {Hop.ORION, Hop.DATABASE}
     assert set(Hop) - set(findings) == {Hop.AGENT, Hop.NOTIFICATIONS}
+    assert not file.exists()
 
 
 async def test_an_address_that_orion_cannot_reach_is_a_failed_notification(
@@ -147,17 +142,6 @@ async def test_an_address_that_orion_cannot_reach_is_a_failed_notification(
 
     assert failed(findings) == {Hop.NOTIFICATIONS}
     assert "cannot deliver" in findings[Hop.NOTIFICATIONS].said
-
-
-async def test_a_history_that_is_not_there_is_not_made(
-    settings: Settings, tmp_path: Path
-) -> None:
-    file = tmp_path / "none.sqlite"
-
-    findings = await find(replace(settings, database_url=f"sqlite:///{file}"), tmp_path)
-
-    assert failed(findings) == {Hop.DATABASE}
-    assert not file.exists()
 
 
 def test_the_command_ends_with_1_where_nothing_runs(place: Site) -> None:

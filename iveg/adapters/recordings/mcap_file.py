@@ -13,6 +13,8 @@ from typing import IO, Final, NamedTuple
 import zstandard
 from mcap.exceptions import McapError
 from mcap.reader import McapReader, NonSeekingReader, make_reader
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from iveg import __version__
@@ -110,6 +112,9 @@ class McapFile:
 
 # --- reading ----------------------------------------------------------------------
 
+_LONGEST_RECORD, _LARGEST_CHUNK = 1 << 28, 1 << 26
+"""Size that is read (bytes), on the disk and unpacked."""
+
 _BROKEN = (
     McapError,
     zstandard.ZstdError,
@@ -158,6 +163,7 @@ def read_messages(
 
 def _reader(stream: IO[bytes]) -> McapReader:
     """Reader by the index; without one, such as in an open file, from the beginning."""
+    _refuse_bombs(stream)
     try:
         reader = make_reader(stream, validate_crcs=True)
         reader.get_summary()
@@ -165,6 +171,25 @@ def _reader(stream: IO[bytes]) -> McapReader:
         stream.seek(0)
         return NonSeekingReader(stream, validate_crcs=True)
     return reader
+
+
+def _refuse_bombs(stream: IO[bytes]) -> None:
+    """Check all chunks before one is unpacked: a few bytes can claim to be gigabytes.
+
+    Raises:
+        ValueError: a chunk is too large.
+    """
+    with contextlib.suppress(McapError, struct.error):
+        for record in StreamReader(
+            stream, emit_chunks=True, record_size_limit=_LONGEST_RECORD
+        ).records:
+            if isinstance(record, Chunk):
+                size = max(
+                    record.uncompressed_size, zstandard.frame_content_size(record.data)
+                )
+                if size > _LARGEST_CHUNK:
+                    raise ValueError(f"a chunk of {size} bytes")
+    stream.seek(0)
 
 
 # --- parts, and what a crash left -------------------------------------------------

@@ -592,8 +592,7 @@ export type OpenSession = {
   name: string;
   /** That is left now; `expired`: STOP alone. */
   role: string;
-  /** `wall`: of a screen, it looks and stops. */
-  kind: "link" | "account" | "wall";
+  kind: "link" | "account";
   began_at: string;
   /** The last request. */
   seen_at: string;

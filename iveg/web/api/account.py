@@ -33,7 +33,6 @@ from iveg.models.access import (
     OwnAccount,
     ProgramToken,
     SessionKind,
-    SessionsEnded,
     SignInCode,
     UserAccount,
 )
@@ -63,16 +62,6 @@ def sessions_router() -> APIRouter:
     return routes
 
 
-def refuse_walls(who: Principal) -> None:
-    """Whoever passes a screen on a wall changes nothing of its person.
-
-    Raises:
-        HTTPException: 403.
-    """
-    if who.wall:
-        raise HTTPException(403, "This session is a wall's: it looks and stops.")
-
-
 def _add(routes: APIRouter, path: str, action: Action, *, everybodys: bool) -> None:
     """List and end the sessions that somebody may see."""
     visitor = Annotated[Principal, Depends(require(action))]
@@ -93,25 +82,11 @@ def _add(routes: APIRouter, path: str, action: Action, *, everybodys: bool) -> N
     @routes.delete(f"{path}/{{session_id}}", response_model=OpenSession)
     async def end(request: Request, session_id: str, who: visitor) -> Response:
         """End one at once, STOP included."""
-        refuse_walls(who)
         for session, role in seen_by(request, who):
             if session.session_id == session_id:
                 authenticator_of(request).sessions.end(session.key)
                 return Json(_open_session(session, role, who))
         raise UnknownNameError("session", session_id)
-
-    @routes.delete(path, response_model=SessionsEnded)
-    async def end_others(request: Request, who: visitor) -> Response:
-        """End all but the one that asks, STOP included."""
-        refuse_walls(who)
-        seen = seen_by(request, who)
-        others = [session.key for session, _ in seen if not _is_own(session, who)]
-        authenticator_of(request).sessions.end(*others)
-        return Json(SessionsEnded(ended=len(others)))
-
-
-def _is_own(session: Session, who: Principal) -> bool:
-    return session.key == who.session
 
 
 def _open_session(session: Session, role: Role, who: Principal) -> OpenSession:
@@ -120,10 +95,10 @@ def _open_session(session: Session, role: Role, who: Principal) -> OpenSession:
         session_id=session.session_id,
         name=session.name,
         role=role,
-        kind="wall" if session.wall else kind,
+        kind=kind,
         began_at=format_stamp(session.began),
         seen_at=format_stamp(session.seen),
-        own=_is_own(session, who),
+        own=session.key == who.session,
     )
 
 

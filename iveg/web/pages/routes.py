@@ -156,7 +156,7 @@ class _ByInvitation(Body):
 
 
 def _add_signing(routes: APIRouter, pages: Pages) -> None:
-    """Add the routes of sign-in, sign-out and of a screen on a wall."""
+    """Add the routes of sign-in and sign-out."""
 
     @routes.get("/signin", response_model=None, dependencies=STRANGERS)
     async def signin(request: Request) -> Response:
@@ -183,11 +183,6 @@ def _add_signing(routes: APIRouter, pages: Pages) -> None:
     )
     async def sign_out(request: Request) -> Response:
         return authenticator_of(request).sign_out(request)
-
-    @routes.post("/wall", status_code=204)
-    async def wall(request: Request, visitor: Reader) -> None:
-        # A screen on a wall is everybody's: it looks and stops, and frees nothing.
-        authenticator_of(request).sessions.lower(visitor)
 
 
 def _add_single_sign_on(routes: APIRouter, pages: Pages, sign_on: SingleSignOn) -> None:

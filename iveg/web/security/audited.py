@@ -76,11 +76,8 @@ _ROWS: Final[Mapping[str, str]] = {
     "DELETE /api/v1/tokens/{token_id}": "token_revoked",
     "DELETE /api/v1/sessions/{session_id}": "session_ended > name",
     "DELETE /api/v1/account/sessions/{session_id}": "session_ended > name",
-    "DELETE /api/v1/sessions": "sessions_ended > ended",
-    "DELETE /api/v1/account/sessions": "sessions_ended > ended",
     "POST /signin": "",
     "POST /signout": "sign_out",
-    "POST /wall": "wall",
 }
 """Method and path of a route → action, keys of the body > keys of the answer."""
 

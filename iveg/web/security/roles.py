@@ -31,14 +31,12 @@ class Principal(Actor):
     Attributes:
         session: Digest of the session that lets them in; None for programs.
         signed_in_at: When (Unix s); None for programs, which do so at each request.
-        wall: The session was left to a screen that everybody passes.
     """
 
     role: Role
     method: SignInMethod = "link"
     session: bytes | None = None
     signed_in_at: float | None = None
-    wall: bool = False
 
     @property
     def has_account(self) -> bool:

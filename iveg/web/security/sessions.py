@@ -25,7 +25,7 @@ from iveg.web.security.roles import Principal, Role
 
 IDLE_S, ABSOLUTE_S, STOP_ONLY_S = 12 * 3600.0, 24 * 3600.0, 12 * 3600.0
 VIEWER_S = 30 * 86400.0
-"""Walls and shared tablets look and stop, and nobody signs them in each morning."""
+"""Shared screens look and stop, and nobody signs them in each morning."""
 
 
 def role_at(session: Session, now: float) -> Role | None:
@@ -104,19 +104,10 @@ class Sessions:
                 found.append((self._sessions[digest], who.role))
         return found
 
-    def end(self, *ended: bytes) -> None:
-        """End those of these digests at once, STOP included."""
-        for digest in ended:
-            self._sessions.pop(digest, None)
+    def end(self, digest: bytes) -> None:
+        """End the one of this digest at once, STOP included."""
+        self._sessions.pop(digest, None)
         self._keep()
-
-    def lower(self, principal: Principal) -> None:
-        """Leave a session what a viewer may do, until somebody signs in anew."""
-        digest = principal.session or b""
-        session = self._sessions.get(digest)
-        if session is not None:
-            self._sessions[digest] = replace(session, role="viewer", wall=True)
-            self._keep()
 
     def _principal(self, digest: bytes, *, touch: bool) -> Principal | None:
         session = self._sessions.get(digest)
@@ -139,7 +130,6 @@ class Sessions:
             session.method,
             digest,
             session.began,
-            session.wall,
         )
 
     def _role(self, session: Session, now: float) -> Role | None:

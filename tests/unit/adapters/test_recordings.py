@@ -1,6 +1,7 @@
 """Recordings, read back by the public tools of MCAP and by iVeg."""
 
 import asyncio
+import struct
 import threading
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager
@@ -10,6 +11,7 @@ from typing import Any
 
 import orjson
 import pytest
+import zstandard
 from mcap.reader import make_reader
 
 from iveg.adapters.recordings import recorder as module
@@ -223,6 +225,17 @@ async def test_every_cut_of_a_file_is_read_as_far_as_it_goes(site: Site) -> None
 
 
 # --- where there is no room -------------------------------------------------------
+
+
+def test_a_chunk_that_claims_gigabytes_is_not_unpacked(tmp_path: Path) -> None:
+    bomb = zstandard.compress(bytes(1 << 28))
+    head = struct.pack("<QQQII4sQ", 0, 1, 1000, 0, 4, b"zstd", len(bomb))
+    body = head + bomb
+    path = tmp_path / "2023-11-14T22-13-20Z.mcap"
+    path.write_bytes(b"\x89MCAP0\r\n" + struct.pack("<BQ", 6, len(body)) + body)
+
+    with pytest.raises(DataFileError, match="268435456 bytes"):
+        list(read_messages(path))
 
 
 async def test_what_does_not_fit_is_counted_and_told_once(

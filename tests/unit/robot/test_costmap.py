@@ -40,8 +40,8 @@ def payload(
     )
 
 
-def costmap(area: Rectangle | None = ROOM) -> FleetCostmap:
-    return FleetCostmap("AGI", BODY, area)
+def costmap() -> FleetCostmap:
+    return FleetCostmap("AGI", BODY, ROOM)
 
 
 def hear(one: FleetCostmap, said: bytes, own: Pose2D = HERE) -> None:
@@ -106,12 +106,8 @@ def test_the_newest_of_a_peer_wins_and_an_older_one_is_dropped() -> None:
     [
         (payload(after=5.0), "from_the_future"),
         (payload(after=-5.0), "too_old"),
-        (
-            payload().replace(b'"frame_id":"map"', b'"frame_id":"odom"'),
-            "not_a_peer_scan",
-        ),
+        (payload().replace(b'"map"', b'"odom"'), "not_a_peer_scan"),
         (payload().replace(b'"x":0.0', b'"x":9.0', 1), "not_a_peer_scan"),
-        (payload().replace(b"3.0", b"NaN", 1), "not_json"),
         (payload() + b" " * 1024, "too_large"),
         (orjson.dumps({**orjson.loads(payload()), "stamp": None}), "no_stamp"),
     ],

@@ -109,13 +109,8 @@ assert isinstance(SET, dict)
         {"goal": {"set": {**SET, "kind": "stop"}}},
         {"goal": {"set": {**SET, "id": "STOP"}}},
         {"goal": {"set": SET, "cancel": {"id": "01G"}}},
-        {"goal": {"set": {**SET, "x": "2"}}},
-        {"goal": {"set": {**SET, "x": 1e7}}},
         {"goal": {"set": {**SET, "speed": 3.0}}},
-        {"goal": {"set": {**SET, "kind": "race"}}},
-        {"goal": {}},
         {"goal": None},
-        [],
     ],
 )
 def test_anything_else_is_left_to_the_reader_of_stop(message: object) -> None:

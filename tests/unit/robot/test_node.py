@@ -83,9 +83,7 @@ class Bench:
             "AGI", settings, profile=RobotProfile(), drive=self.driven.append
         )
 
-    async def run(
-        self, seconds: float, wish: Twist2D, backlog_s: float | None = None
-    ) -> None:
+    async def run(self, seconds: float, wish: Twist2D) -> None:
         """Odometry, feedback and wishes twenty times a second."""
         for _ in range(round(seconds * 20)):
             self.now, self.seq = self.now + 0.05, self.seq + 1
@@ -96,7 +94,6 @@ class Bench:
                 Origin("cloud", self.seq),
                 speed_limits={"AGI": CLEAR},
                 seen={"AGI": self.link.newest_report()},
-                backlog_s=backlog_s,
             )
             self.link.take("/AGII/mqtt_feedback", codec.write_feedback(said))
             self.node.request_twist(wish)
@@ -155,12 +152,3 @@ def test_a_retained_stop_holds_and_retained_feedback_is_no_author(bench: Bench) 
 
     assert bench.node.machine.holds.find("01STOP") is not None
     assert bench.node.machine.authors.echoes(bench.now) == ()
-
-
-async def test_an_agent_that_is_behind_is_spared_poses(bench: Bench) -> None:
-    await bench.run(1.0, REST)
-    before = {topic for topic, _ in bench.link.sent}
-    await bench.run(6.0, REST, backlog_s=10.0)
-
-    assert "/AGI/iveg/odom" not in before
-    assert "/AGI/iveg/odom" in {topic for topic, _ in bench.link.sent}

@@ -12,7 +12,6 @@ import { createHints } from "../panels/hints.js";
 import { createSignOut } from "../panels/signout.js";
 import { labelTables } from "../panels/tables.js";
 import { createTone } from "../panels/tone.js";
-import { createWall } from "../panels/wall.js";
 import { readApi } from "./api.js";
 import { guarded } from "./hub.js";
 import { createInstalling, registerWorker } from "./install.js";
@@ -56,7 +55,6 @@ export async function startPage(app) {
   guarded(() => createAlertsPanel(app, page.tone));
   guarded(() => createHealthPanel(app));
   guarded(() => createSignOut(app));
-  guarded(() => createWall(app));
   guarded(wirePrinting);
   registerWorker();
   guarded(() => labelTables(app));

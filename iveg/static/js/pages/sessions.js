@@ -30,7 +30,7 @@ function createSessions(page, path) {
   function cells(session) {
     const { session_id, name, role, kind, began_at, seen_at, own } = session;
     const change = make("td", "", own ? label("own") : "");
-    const end = () => finish(`${path}/${session_id}`, "ended", { name });
+    const end = () => finish(session_id, name);
     if (!own) change.append(makeTwice(label("end"), label("end_sure", { name }), end));
     return [
       make("td", "", i18n.t("rows.by", { by: name })),
@@ -42,22 +42,14 @@ function createSessions(page, path) {
     ];
   }
 
-  /** @param {string} address @param {string} key @param {{name?: string}} slots */
-  async function finish(address, key, slots) {
-    const { status, body } = await sendApi("DELETE", address, {});
+  /** @param {string} sessionId @param {string} name of the person */
+  async function finish(sessionId, name) {
+    const { status } = await sendApi("DELETE", `${path}/${sessionId}`, {});
     rows.load();
     const failed = i18n.t(status ? "rows.failed" : "rows.offline", { status });
-    const done = label(key, { ...slots, count: body?.ended ?? 1 });
+    const done = label("ended", { name });
     setText(need("#sessions-note"), status === 200 ? done : failed);
   }
-
-  function drawOthers() {
-    const end = () => finish(path, "others_ended", {});
-    const others = makeTwice(label("others"), label("others_sure"), end);
-    need("#sessions-others").replaceChildren(others);
-  }
-  i18n.onChange(drawOthers);
-  drawOthers();
   keepFresh("sessions", rows.load);
   rows.load();
 }

@@ -1,8 +1,6 @@
 """Recorded runs as files: JSON lines, and iVeg's own."""
 
 import gzip
-import json
-import logging
 import math
 from pathlib import Path
 
@@ -41,20 +39,12 @@ def written(tmp_path: Path, *lines: str) -> Path:
 
 
 def test_the_offset_of_the_sensor_becomes_its_mount(tmp_path: Path) -> None:
-    scan = {
-        "t": 0.1,
-        "kind": "scan",
-        "angle_min": -3.0,
-        "angle_increment": 2.0,
-        "range_min": 0.75,
-        "range_max": 130.0,
-        "ox": 0.2,
-        "oy": -0.1,
-        "ranges": [0.5, None, 7],
-        "t_src": 1.0,
-    }
+    scan = (
+        '{"t":0.1,"kind":"scan","angle_min":-3,"angle_increment":2,"range_min":0.75,'
+        '"range_max":130,"ox":0.2,"oy":-0.1,"ranges":[0.5,null,7],"t_src":1}'
+    )
 
-    _, entry = LogReader(written(tmp_path, ODOM, json.dumps(scan))).entries()
+    _, entry = LogReader(written(tmp_path, ODOM, scan)).entries()
 
     assert isinstance(entry.observation, LaserScan)
     assert entry.observation.mount == Pose2D(0.2, -0.1, 0.0)
@@ -67,15 +57,8 @@ def test_the_offset_of_the_sensor_becomes_its_mount(tmp_path: Path) -> None:
     [
         ("{broken", "not_json"),
         ('{"t":1,"kind":"odom","x":1,"y":2}', "yaw"),
-        ('{"t":1,"kind":"odom","x":"1","y":2,"yaw":0}', "x"),
         ('{"t":1,"kind":"odom","x":NaN,"y":2,"yaw":0}', "not_json"),
-        ('{"t":-1,"kind":"odom","x":1,"y":2,"yaw":0}', "t"),
         ('{"t":1,"kind":"smell"}', "smell"),
-        ("[]", "dict"),
-        (
-            '{"t":1,"kind":"detection","class":"a=b","probability":1,"x":0,"y":0}',
-            "bad_class",
-        ),
     ],
 )
 def test_a_bad_line_is_skipped_and_reported_once_with_file_and_number(
@@ -84,10 +67,7 @@ def test_a_bad_line_is_skipped_and_reported_once_with_file_and_number(
     file = written(tmp_path, ODOM, line, ODOM)
     reader = LogReader(file)
 
-    with caplog.at_level(logging.WARNING):
-        twice = [*reader.entries(), *reader.entries()]
-
-    assert len(twice) == 4
+    assert len([*reader.entries(), *reader.entries()]) == 4
     (record,) = caplog.records
     assert f"{file}, line 2 skipped" in record.getMessage()
     assert why in record.getMessage()
@@ -128,27 +108,15 @@ def test_a_file_that_is_missing_not_gzipped_or_cut_short_is_refused(
         list(LogReader(file).entries())
 
 
-@pytest.fixture
-def robots_log(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
-    """The emulator's recording of a robot, or a real one by its name."""
-    if request.param in ROBOTS:
-        return emulated_logs(tmp_path)[ROBOTS.index(request.param)]
-    return real_log(request.param)
-
-
 @pytest.mark.parametrize(
-    ("robots_log", "beams", "lines"),
-    [
-        ("AGI", 720, 100),
-        ("orchard_d1", 897, 1_000),
-        ("orchard_d3", 897, 1_000),
-    ],
-    indirect=["robots_log"],
+    ("name", "beams", "lines"),
+    [("AGI", 720, 100), ("orchard_d1", 897, 1_000), ("orchard_d3", 897, 1_000)],
 )
 def test_the_log_of_a_robot_reads_without_a_complaint(
-    robots_log: Path, beams: int, lines: int, caplog: pytest.LogCaptureFixture
+    name: str, beams: int, lines: int, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    entries = list(LogReader(robots_log).entries())
+    file = emulated_logs(tmp_path)[0] if name == ROBOTS[0] else real_log(name)
+    entries = list(LogReader(file).entries())
     scans = [e.observation for e in entries if isinstance(e.observation, LaserScan)]
 
     assert caplog.records == []

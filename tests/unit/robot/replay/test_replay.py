@@ -1,6 +1,5 @@
 """Recordings of any format, and their playback."""
 
-import logging
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -134,10 +133,7 @@ def test_a_bag_of_each_kind_gives_odometry_and_scans(
 @pytest.mark.parametrize(
     ("topics", "why"),
     [
-        (
-            AS_RECORDED,
-            r"--odom-topic must name one of those of nav_msgs\S+: /odom, /raw\.$",
-        ),
+        (AS_RECORDED, r"--odom-topic must name one of .*: /odom, /raw\.$"),
         ({"odometry": "/scan"}, r"--odom-topic must name one of .*: /odom, /raw\.$"),
         ({"odometry": "/raw", "scan": "/gone"}, r"--scan-topic must .*: /scan\.$"),
     ],
@@ -159,30 +155,14 @@ def test_a_message_that_cannot_be_used_is_reported_once_and_skipped(
     said[4] = replace(said[4], x=math.nan)
     recording = open_recording(db3_bag(tmp_path / "run", said), MOUNT)
 
-    with caplog.at_level(logging.WARNING):
-        assert len(poses(list(recording()))) == 8
-        assert len(poses(list(recording()))) == 8
+    assert len(poses(list(recording()))) == len(poses(list(recording()))) == 8
 
     (told,) = caplog.messages
     assert "/odom: unusable messages are skipped" in told
 
 
-@pytest.mark.parametrize("suffix", [".db3", ".mcap"])
-@pytest.mark.parametrize("content", [b"", b"no bag at all\n" * 20, b"\x00" * 4096])
-def test_a_foreign_file_is_refused_with_one_sentence(
-    suffix: str, content: bytes, tmp_path: Path
-) -> None:
-    file = tmp_path / f"log{suffix}"
-    file.write_bytes(content)
-
-    with pytest.raises(DataFileError, match=rf"log{suffix}: cannot be read: ") as told:
-        entries(file)
-
-    assert "\n" not in str(told.value)
-
-
 @pytest.mark.parametrize(("write", "name"), KINDS[:2])
-@pytest.mark.parametrize("kept", [0.2, 0.5, 0.9])
+@pytest.mark.parametrize("kept", [0.0, 0.2, 0.5, 0.9])
 def test_a_bag_that_was_cut_off_never_ends_in_anything_but_a_sentence(
     write: Write, name: str, kept: float, tmp_path: Path
 ) -> None:

@@ -8,56 +8,49 @@ from typing import Any
 import pytest
 
 from iveg.domain.observations import DetectionFrame
-from iveg.robot.ros2.config import RobotConfig
 from iveg.ros2 import cdr
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as ros
 from iveg.ros2.messages import Message
 from tests.unit.robot.ros2 import said
-from tests.unit.robot.ros2.said import MONO, Bench, tf
-from tests.unit.robot.ros2.test_pictures import HEIGHT, TOPICS, WIDTH, depth, info
+from tests.unit.robot.ros2.said import MONO, tf
+from tests.unit.robot.ros2.test_pictures import (
+    HEIGHT,
+    MIDDLE,
+    OPTICAL,
+    TALL,
+    WIDTH,
+    bench,
+    depth,
+    look,
+)
 
 TRUTH = (13.0, 0.0)
 """Where the person stands in map (m): 3 m before a camera that is at (10, 0, 1) and
 looks east; ``test_pictures`` draws the same person."""
-OPTICAL = ros.Header(said.stamp(), "camera_optical")
 UNSEEN = ros.Header()
 CLOSE_M = 0.1
-BOX_FIELDS = fields(d.BoundingBox)
-
-
-def bench() -> Bench:
-    found = Bench(RobotConfig(topics=TOPICS), tree=False)
-    optical = ros.Quaternion(-0.5, 0.5, -0.5, 0.5)
-    place = ros.Transform(ros.Vector3(10.0, 0.0, 1.0), optical)
-    links = (
-        ros.TransformStamped(ros.Header(said.stamp(), "map"), "camera_optical", place),
-        said.link("map", "base_link", 11.0, 1.0, math.pi / 2),
-    )
-    found.hear("tf_static", tf(*links))
-    return found
 
 
 def told(
-    one: Bench, topic: str, message: Message, form: type[Message] | None = None
+    topic: str, message: Message, form: type[Message] | None = None
 ) -> DetectionFrame:
-    """What follows from a message."""
+    """What follows from a message, of a camera with depth."""
+    base = said.link("map", "base_link", 11.0, 1.0, math.pi / 2)
+    one = bench().hear("tf_static", tf(base)).hear("depth", depth())
     one.inputs.hear(topic, [cdr.write(message)], MONO, form=form or type(message))
     (found,) = one.tick()
     assert isinstance(found, DetectionFrame)
     return found
 
 
-def sure(name: str = "farmer") -> tuple[ros.ObjectHypothesisWithPose, ...]:
-    return (ros.ObjectHypothesisWithPose(ros.ObjectHypothesis(name, 0.9)),)
-
-
 # --- with depth ---------------------------------------------------------------------
 
 
 def vision_3d(header: ros.Header, centre: ros.Point, size: ros.Vector3) -> Any:
+    sure = ros.ObjectHypothesisWithPose(ros.ObjectHypothesis("farmer", 0.9))
     box = ros.BoundingBox3D(ros.Pose(centre), size)
-    return ros.Detection3DArray(header, (ros.Detection3D(UNSEEN, sure(), box),))
+    return ros.Detection3DArray(header, (ros.Detection3D(UNSEEN, (sure,), box),))
 
 
 def yolact(header: ros.Header, centre: ros.Point, size: ros.Vector3) -> Any:
@@ -80,21 +73,9 @@ Made = Callable[[ros.Header, ros.Point, ros.Vector3], Message]
 @pytest.mark.parametrize(
     ("frame", "centre", "size"),
     [
-        (
-            "camera_optical",
-            ros.Point(0.0, 0.1, 3.0),
-            ros.Vector3(0.6, 1.8, 0.4),
-        ),
-        (
-            "base_link",
-            ros.Point(-1.0, -2.0, 0.9),
-            ros.Vector3(0.6, 0.4, 1.8),
-        ),
-        (
-            "/map",
-            ros.Point(13.0, 0.0, 0.9),
-            ros.Vector3(0.4, 0.6, 1.8),
-        ),
+        ("camera_optical", ros.Point(0.0, 0.1, 3.0), ros.Vector3(0.6, 1.8, 0.4)),
+        ("base_link", ros.Point(-1.0, -2.0, 0.9), ros.Vector3(0.6, 0.4, 1.8)),
+        ("/map", ros.Point(13.0, 0.0, 0.9), ros.Vector3(0.4, 0.6, 1.8)),
     ],
 )
 def test_a_box_with_depth_lies_where_the_person_is(
@@ -102,7 +83,7 @@ def test_a_box_with_depth_lies_where_the_person_is(
 ) -> None:
     header = ros.Header(said.stamp(), frame)
 
-    (one,) = told(bench(), "detections_3d", made(header, centre, size)).detections
+    (one,) = told("detections_3d", made(header, centre, size)).detections
 
     assert (one.class_id, one.probability) == ("farmer", 0.9)
     assert math.dist(one.box.centre[:2], TRUTH) <= CLOSE_M
@@ -113,17 +94,12 @@ def test_a_box_with_depth_lies_where_the_person_is(
 def test_a_detection_of_yolo_without_depth_is_no_place_at_the_origin() -> None:
     seen = d.DetectionArray(OPTICAL, (d.Detection(0, "farmer", 0.9),))
 
-    found = told(bench(), "detections_3d", seen)
+    found = told("detections_3d", seen)
 
     assert (found.detections, found.unread) == ((), ("farmer",))
 
 
 # --- in a picture -------------------------------------------------------------------
-
-
-def vision_2d(centre: ros.Point2D, size: ros.Point2D) -> Any:
-    box = ros.BoundingBox2D(ros.PicturePose(centre), size.x, size.y)
-    return ros.Detection2DArray(OPTICAL, (ros.Detection2D(UNSEEN, sure(), box),))
 
 
 def yolox_box(centre: ros.Point2D, size: ros.Point2D) -> d.BoundingBox:
@@ -152,24 +128,18 @@ def yolo_2d(centre: ros.Point2D, size: ros.Point2D) -> Any:
 
 
 Drawn = Callable[[ros.Point2D, ros.Point2D], Message]
-MIDDLE, TALL = ros.Point2D(32.0, 25.0), ros.Point2D(20.0, 34.0)
 
 
-@pytest.mark.parametrize("drawn", [vision_2d, yolox, yolo_2d])
+@pytest.mark.parametrize("drawn", [look, yolox, yolo_2d])
 @pytest.mark.parametrize(
     ("centre", "size"),
-    [
-        (MIDDLE, TALL),
-        (ros.Point2D(32.0, 17.0), ros.Point2D(20.0, 46.0)),
-    ],
+    [(MIDDLE, TALL), (ros.Point2D(32.0, 17.0), ros.Point2D(20.0, 46.0))],
     ids=["within the picture", "over its upper edge"],
 )
 def test_a_box_in_a_picture_lies_where_the_person_is(
     drawn: Drawn, centre: ros.Point2D, size: ros.Point2D
 ) -> None:
-    one = bench().hear("depth", depth()).hear("camera_info", info())
-
-    (found,) = told(one, "detections_2d", drawn(centre, size)).detections
+    (found,) = told("detections_2d", drawn(centre, size)).detections
 
     assert found.class_id == "farmer"
     assert found.probability == pytest.approx(0.9)
@@ -183,12 +153,11 @@ def test_boxes_of_yolox_since_2022_are_read_as_those_before(
 ) -> None:
     """The number at the end of each moves the next one, as the text before it ends."""
     box = replace(yolox_box(MIDDLE, TALL), class_id=class_id)
-    parts = {one.name: getattr(box, one.name) for one in BOX_FIELDS}
+    parts = {one.name: getattr(box, one.name) for one in fields(box)}
     newer = d.NumberedBoundingBox(**parts, class_id_int=3)
-    one = bench().hear("depth", depth()).hear("camera_info", info())
-
     seen = d.NumberedBoundingBoxes(OPTICAL, UNSEEN, (newer,) * count)
-    found = told(one, "detections_2d", seen, d.BoundingBoxes).detections
+
+    found = told("detections_2d", seen, d.BoundingBoxes).detections
 
     assert [one.class_id for one in found] == [class_id] * count
     assert all(math.dist(one.box.centre[:2], TRUTH) <= CLOSE_M for one in found)
@@ -198,9 +167,8 @@ def test_the_picture_that_yolox_looked_at_is_the_one_that_counts() -> None:
     """Some builds put the time of publishing into the first header."""
     late = ros.Header(said.stamp(0.2), "")
     seen = d.BoundingBoxes(late, OPTICAL, (yolox_box(MIDDLE, TALL),))
-    one = bench().hear("depth", depth()).hear("camera_info", info())
 
-    (found,) = told(one, "detections_2d", seen).detections
+    (found,) = told("detections_2d", seen).detections
 
     assert math.dist(found.box.centre[:2], TRUTH) <= CLOSE_M
 
@@ -218,9 +186,7 @@ def test_the_picture_that_yolox_looked_at_is_the_one_that_counts() -> None:
 def test_a_picture_with_nobody_in_it_is_an_empty_frame(
     topic: str, message: Message
 ) -> None:
-    one = bench().hear("depth", depth()).hear("camera_info", info())
-
-    found = told(one, topic, message)
+    found = told(topic, message)
 
     assert (found.detections, found.unread) == ((), ())
 
@@ -236,8 +202,6 @@ def test_a_picture_with_nobody_in_it_is_an_empty_frame(
     ],
 )  # fmt: skip
 def test_a_class_that_is_a_number_is_sent_as_one(topic: str, message: Any) -> None:
-    one = bench().hear("depth", depth()).hear("camera_info", info())
-
-    (found,) = told(one, topic, message).detections
+    (found,) = told(topic, message).detections
 
     assert found.class_id == "1"

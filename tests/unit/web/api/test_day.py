@@ -3,18 +3,26 @@
 import re
 from collections.abc import AsyncIterator
 from datetime import date
-from functools import partial
 from pathlib import Path
 
 import httpx
 import pytest
+from fastapi import FastAPI
 
 from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.upkeep import purge_piece
+from iveg.domain.geometry import Rectangle
+from iveg.domain.greenhouse import DriveLane, Greenhouse
+from iveg.domain.observations import Instant
 from iveg.domain.records import Record
 from iveg.domain.retention import DAY_S, PURGE_STEPS
 from iveg.models.history import Day
 from iveg.web.api import day
+from iveg.web.pages.contexts import Site
+from iveg.web.pages.drawing import Pages
+from iveg.web.pages.sentences import start_of
+from iveg.web.security.requirements import require
+from tests.databases import remember
 from tests.fakes.records import (
     alert_record,
     command_record,
@@ -23,10 +31,12 @@ from tests.fakes.records import (
     odometry_record,
 )
 from tests.fakes.worker import FakeWorker
-from tests.unit.web.api.sheets import GREENHOUSE, MORNING, reader
 
 Client = httpx.AsyncClient
 
+LANE = DriveLane("1", Rectangle(0, 0, 20, 4))
+GREENHOUSE = Greenhouse("house", Rectangle(0, 0, 20, 20), lanes=(LANE,))
+MORNING = start_of(date(2026, 11, 20)) + 9 * 3600.0
 RECORDS: tuple[Record, ...] = (
     *(odometry_record(at=MORNING + n / 2, x=5.0, y=2.0) for n in range(240)),
     detection_record(at=MORNING + 10.0, x=6.0, y=2.0, person_id="P1"),
@@ -44,10 +54,18 @@ def url(tmp_path: Path) -> str:
 
 @pytest.fixture
 async def browser(url: str) -> AsyncIterator[Client]:
+    """A viewer an hour later."""
+    remember(url, *RECORDS)
+
     async def read(wanted: date, now: float) -> Day:
         return await FakeWorker().run(day.read_day, url, GREENHOUSE, wanted, now)
 
-    async with reader(url, RECORDS, partial(day.router, read)) as client:
+    pages = Pages(Site("house", ("AGI",), "1", demo=False), lambda: True)
+    app = FastAPI()
+    app.dependency_overrides[require("read")] = lambda: None
+    app.include_router(day.router(read, pages, lambda: Instant(0.0, MORNING + 3600.0)))
+    transport = httpx.ASGITransport(app=app)
+    async with Client(transport=transport, base_url="http://iveg") as client:
         yield client
 
 

@@ -1,16 +1,14 @@
 """Exports: the page of columns, and files from the command line."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from iveg.adapters.history.recorder import Store
 from iveg.cli import main
 from iveg.domain.records import LISTS, SHOWN_COLUMNS
 from iveg.models import dictionary
-from iveg.vital.record import Waiting
 from iveg.web.api import exports
+from tests.databases import remember
 from tests.fakes.records import NOON, odometry_record
 from tests.processes import ROOT
 
@@ -18,15 +16,13 @@ ROWS = 2345
 
 
 @pytest.fixture
-def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A history of some rows, which the command line finds."""
     monkeypatch.setenv("IVEG_DATA_DIRECTORY", str(tmp_path))
     monkeypatch.delenv("IVEG_DATABASE_URL", raising=False)
-    store = Store(f"sqlite:///{tmp_path / 'iveg.sqlite'}")
-    rows = [odometry_record(at=NOON + n) for n in range(ROWS)]
-    store.write([Waiting(one, n, 0.0) for n, one in enumerate(rows, 1)])
-    yield tmp_path
-    store.close()
+    rows = (odometry_record(at=NOON + n) for n in range(ROWS))
+    remember(f"sqlite:///{tmp_path / 'iveg.sqlite'}", *rows)
+    return tmp_path
 
 
 def test_each_column_of_each_list_is_told_and_in_its_file() -> None:

@@ -1,19 +1,26 @@
-"""Telemetry of one browser: the newest of what changed, in a window, at its pace."""
+"""Telemetry of one browser: the newest of what changed, in a window, at its pace.
 
+Pages are believed about moments that can be, and about nothing else.
+"""
+
+import math
 import struct
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import orjson
 import pytest
 
-from iveg.web.live.feed import FRAMES, GAP_S, Painting, TelemetryFeed
+from iveg.domain.latency import LatencyWatch, Sketch, merged
+from iveg.domain.observations import Received
+from iveg.domain.transports import DIRECT
+from iveg.web.live.feed import FRAMES, GAP_S, CreditWindow, Painting, TelemetryFeed
 from iveg.web.live.telemetry import NO_RETURN, UNIT_M
-from tests.builders import detection, scan
+from tests.builders import START, at, detection, odometry, origin, scan
 from tests.unit.web.desk import WebDesk
 
-MANY = tuple(f"R{number:02d}" for number in range(20))
+NOW = START.mono
 
 
 @dataclass
@@ -55,9 +62,6 @@ class Page:
         """All that frames told under a member."""
         return [one for frame in self.frames for one in frame[member]]
 
-    def topics(self) -> list[str]:
-        return [one["topic"] for one in self.told("parts") + self.told("scans")]
-
 
 @pytest.fixture
 def desk() -> WebDesk:
@@ -81,19 +85,6 @@ def test_a_slow_page_skips_and_never_lags(desk: WebDesk, page: Page) -> None:
     assert xs[-1] == 99.0
     assert xs == sorted(xs)
     assert len(xs) == FRAMES + 1
-
-
-def test_however_much_has_changed_a_frame_tells_of_each_robot_once() -> None:
-    desk = WebDesk(MANY)
-    page = Page(desk)
-    for number in range(5):
-        for robot_id in MANY:
-            desk.drive(robot_id, float(number))
-
-    page.read()
-
-    assert [move[0] for move in page.told("moves")] == list(MANY)
-    assert {move[3] for move in page.told("moves")} == {4.0}
 
 
 def test_changes_within_a_gap_share_a_frame(desk: WebDesk, page: Page) -> None:
@@ -206,18 +197,80 @@ def test_a_scan_is_ranges_in_integers_finer_than_a_centimetre(
     assert len(page.bodies[0]) % 4 == 0
 
 
-def test_f60_a_scan_that_cannot_be_written_is_refused_and_all_else_is_told(
-    page: Page,
-) -> None:
-    page.desk.drive("AGI")
-    page.desk.hear(scan(origin=page.desk.next_origin()))
-    robot = page.desk.world.robot("AGI")
-    assert robot.scan is not None
-    robot.scan = replace(robot.scan, mount=None)  # type: ignore[arg-type]
+# --- the window: how much is on its way to one page -------------------------------
 
-    frame = page.read()
 
-    assert frame is not None
-    assert [move[0] for move in frame["moves"]] == ["AGI"]
-    assert frame["scans"] == []
-    assert page.desk.ingest.counters["rejected.undrawable_scan"] == 1
+def filled(count: int = FRAMES) -> CreditWindow:
+    """A window with that many frames on their way, all sent now."""
+    window = CreditWindow()
+    for _ in range(count):
+        window.sent(NOW)
+    return window
+
+
+def test_over_a_long_round_trip_the_window_is_spread_and_not_sent_in_one_go() -> None:
+    window, now = CreditWindow(), NOW
+    for number in range(1, 30):
+        window.sent(now)
+        window.painted(number, now + 0.3)
+        now += 1.0
+
+    window.sent(now)
+
+    assert window.opens_at - now == pytest.approx(0.3 / FRAMES, rel=0.01)
+
+
+@pytest.mark.parametrize("word", [9, -1, 0, "1", True, 1.0, None, [1], 10**30])
+def test_what_no_page_can_have_painted_gives_no_credit(word: object) -> None:
+    window = filled()
+
+    assert not window.painted(word, NOW)
+    assert window.opens_at == math.inf
+    assert window.painted(1, NOW + 0.02)
+    assert window.opens_at < math.inf
+
+
+# --- Δt₄: from the decision to the drawn frame ------------------------------------
+
+
+def drawn(topic: str, moment: object, within: object) -> Sketch:
+    """What is measured when AGI's odometry was decided on at 1.0 s, sent at 1.01 s."""
+    watch = LatencyWatch(("AGI",), lambda *_: None)
+    watch.decided([Received(odometry(origin=origin()), at(0.9), DIRECT.id)], at(1.0))
+    painting = Painting(watch)
+    painting.adds(topic, NOW + 1.01)
+    painting.sent(1, NOW + 1.01)
+    painting.painted(1, moment, within, NOW + 1.05)
+    parts = [one.segments["screen"].parts("1min") for one in watch.streams]
+    return merged(part for each in parts for part in each)
+
+
+def test_what_a_page_drew_is_measured_from_the_decision() -> None:
+    measured = drawn("robots/AGI", NOW + 1.04, 0.002)
+
+    assert measured.count == 1
+    assert measured.mean == pytest.approx(0.04)
+
+
+@pytest.mark.parametrize(
+    ("moment", "within"),
+    [
+        (NOW + 9.0, 0.001),
+        (NOW + 0.5, 0.001),
+        (math.nan, 0.001),
+        (math.inf, 0.001),
+        ("now", 0.001),
+        (True, 0.001),
+        (NOW + 1.04, None),
+        (NOW + 1.04, -1.0),
+        (NOW + 1.04, 5.0),
+        (NOW + 0.98, 0.05),
+    ],
+)
+def test_a_moment_that_cannot_be_is_not_used(moment: object, within: object) -> None:
+    assert drawn("robots/AGI", moment, within).count == 0
+
+
+@pytest.mark.parametrize("topic", ["people", "robots/AGIX", "detections/AGI"])
+def test_what_was_never_decided_on_is_not_sampled(topic: str) -> None:
+    assert drawn(topic, NOW + 1.04, 0.001).count == 0

@@ -7,13 +7,10 @@ from typing import Any
 
 import orjson
 import pytest
-from mcap.records import Chunk
-from mcap.stream_reader import StreamReader
 
 from iveg.adapters.recordings.pictures import PICTURES_S, WHOLE_S, PictureFiles
 from iveg.adapters.recordings.writer import FLUSH_S
 from iveg.domain.errors import NotRecordedError
-from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import write_json
 from iveg.models.snapshot import PastWorld
@@ -148,22 +145,6 @@ async def test_a_file_is_of_five_minutes_and_begins_whole(recorded: Recorded) ->
         assert abs(x_of(await recorded.world(seconds)) - SPEED * seconds) < 0.3
 
 
-async def test_where_the_clock_was_set_back_the_later_file_is_shown(
-    recorded: Recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    await recorded.take(30.0)
-    await recorded.finish()
-    back = Instant(START.mono, START.wall + 20.0)
-    monkeypatch.setattr("tests.fakes.clock.at", back.later)
-    again = Recorded(tmp_path)
-    await again.take(5.0)
-    await again.finish()
-
-    shown = await again.world(22.0)
-
-    assert abs(x_of(shown) - SPEED * 2.0) < 0.3
-
-
 async def test_a_picture_without_room_is_followed_by_a_whole_one(
     recorded: Recorded,
 ) -> None:
@@ -184,15 +165,19 @@ async def test_a_chunk_that_is_damaged_is_a_gap_and_no_wrong_picture(
     await recorded.take(30.0)
     await recorded.finish()
     (path,) = recorded.folder.glob("*.mcap")
-    file = PictureFiles(recorded.folder)
-    data, place = bytearray(path.read_bytes()), chunk_at(path, 14.0)
-    data[place + 200] ^= 0xFF
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 0xFF
     path.write_bytes(data)
 
-    with pytest.raises(NotRecordedError):
-        file.by(START.wall + 18.0)
-    assert file.by(START.wall + 8.0)
-    assert file.by(START.wall + 27.0)
+    gaps = []
+    for seconds in range(1, 30):
+        try:
+            shown = await recorded.world(seconds)
+        except NotRecordedError:
+            gaps.append(seconds)
+        else:
+            assert x_of(shown) == pytest.approx(SPEED * (shown["at_s"] - START.wall))
+    assert 0 < len(gaps) < 20
 
 
 # --- over HTTP --------------------------------------------------------------------
@@ -255,15 +240,3 @@ def without_ages(value: Any) -> Any:
     # A page lets rings grow and margins shrink by itself.
     counts = ("age_s", "counters", "radius_m", "margin", "acting")
     return {key: without_ages(one) for key, one in value.items() if key not in counts}
-
-
-def chunk_at(path: Path, seconds: float) -> int:
-    """Where the chunk of a moment begins."""
-    at = round((START.wall + seconds) * 1e9)
-    with path.open("rb") as stream:
-        begins = 0
-        for record in StreamReader(stream, emit_chunks=True).records:
-            if isinstance(record, Chunk) and record.message_end_time >= at:
-                return begins
-            begins = stream.tell()
-    raise AssertionError("no such chunk")

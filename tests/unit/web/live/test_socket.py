@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator
-from dataclasses import replace
 from typing import Any
 
 import orjson
@@ -13,7 +12,6 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.typing import Subprotocol
 
 from iveg.domain.observations import Climate
-from iveg.domain.parameters import ByClass
 from iveg.vital.publish import MAX_PENDING
 from iveg.web.live.feed import FRAMES, SUBPROTOCOL, Painting, TelemetryFeed
 from iveg.web.live.socket import Line
@@ -89,28 +87,41 @@ async def looking(
         yield Browser(socket)
 
 
-async def test_the_first_frame_is_the_snapshot() -> None:
+async def test_the_first_frame_is_the_snapshot_and_a_ping_has_the_servers_time() -> (
+    None
+):
     desk = WebDesk()
     desk.drive("AGI", 3.0)
     async with desk.serving() as address, looking(desk, address) as browser:
         first = await browser.read()
+        await browser.say(type="ping", t=123.5)
+        (pong,) = await browser.read_until("pong")
 
     assert first["topic"] == "snapshot"
     assert first["data"]["user"] == {"name": "ana", "role": "operator"}
     assert first["data"]["robots"][0]["pose"]["x"] == 3.0
+    assert pong["data"] == {"t": 123.5, "server": desk.clock().wall}
 
 
-async def test_a_session_that_is_over_is_closed_with_4401() -> None:
+@pytest.mark.parametrize(
+    ("protocols", "after_s", "code"),
+    [(PROTOCOLS, 13 * 3600.0, 4401), (None, 0.0, 4406)],
+)
+async def test_a_session_that_is_over_or_another_protocol_is_closed_with_its_code(
+    protocols: list[Subprotocol] | None, after_s: float, code: int
+) -> None:
     desk = WebDesk()
     async with desk.serving() as address:
         headers = desk.cookie()
-        desk.clock.now += 13 * 3600.0
+        desk.clock.now += after_s
         async with connect(
             f"ws://{address}/live",
             additional_headers=headers,
             origin=f"http://{address}",  # type: ignore[arg-type]
+            subprotocols=protocols,
         ) as socket:
-            assert await Browser(socket).close_code() == 4401
+            assert await Browser(socket).close_code() == code
+    assert desk.hub.watchers == 0
 
 
 @pytest.mark.parametrize("origin", ["http://evil.test", "null", None])
@@ -180,44 +191,6 @@ async def test_everything_says_when_it_was_true_on_one_clock() -> None:
     assert browser.telemetry[0]["moves"][0][1] == now
 
 
-async def test_a_new_rule_is_followed_by_the_rings_that_it_draws() -> None:
-    desk, radii = WebDesk(), list[float]()
-    desk.drive("AGII")
-    desk.look("AGII", detection("farmer", 1.0))
-    async with desk.serving() as address, looking(desk, address) as browser:
-        wanted = replace(desk.rules.current, radius_m=ByClass(3.5))
-        await desk.rules.change(wanted, "ana", desk.clock())
-        told = await browser.read_until("rule")
-        while radii[-1:] != [3.5]:
-            desk.hub.changed("health")
-            await browser.read_until("health")
-            for frame in browser.telemetry:
-                await browser.say(type="painted", frame=frame["frame"])
-                people = [one for one in frame["parts"] if one["topic"] == "people"]
-                radii += [
-                    person["radius_m"]
-                    for one in people
-                    for person in one["data"]["changed"]
-                ]
-            desk.clock.now += 0.02
-
-    assert told[-1]["data"]["radius_m"] == 3.5
-
-
-async def test_who_does_not_ask_for_the_protocol_is_closed_with_4406() -> None:
-    desk = WebDesk()
-    async with (
-        desk.serving() as address,
-        connect(
-            f"ws://{address}/live",
-            additional_headers=desk.cookie(),
-            origin=f"http://{address}",  # type: ignore[arg-type]
-        ) as socket,
-    ):
-        assert await Browser(socket).close_code() == 4406
-    assert desk.hub.watchers == 0
-
-
 async def test_f23_who_lets_events_pile_up_is_closed_with_4008() -> None:
     desk = WebDesk()
     async with desk.serving() as address, looking(desk, address) as browser:
@@ -255,16 +228,6 @@ async def test_f23_who_does_not_read_what_is_sent_is_closed_with_4008() -> None:
     assert deaf.code == 4008
 
 
-async def test_a_ping_is_answered_with_the_servers_time() -> None:
-    desk = WebDesk()
-    async with desk.serving() as address, looking(desk, address) as browser:
-        await browser.read()
-        await browser.say(type="ping", t=123.5)
-        (pong,) = await browser.read_until("pong")
-
-    assert pong["data"] == {"t": 123.5, "server": desk.clock().wall}
-
-
 @pytest.mark.parametrize(
     ("robot_id", "stopped"), [("AGI", ["AGI"]), (None, ["AGI", "AGII"])]
 )
@@ -291,17 +254,3 @@ async def test_a_revoked_session_can_no_longer_stop() -> None:
 
         assert await browser.close_code() == 4401
     assert desk.fleet.stops == []
-
-
-async def test_a_mistake_of_ours_is_told_as_an_error_and_ends_that_line(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    desk = WebDesk()
-    async with desk.serving() as address, looking(desk, address) as browser:
-        await browser.read()
-        desk.hub.append("commands/nonsense", object())
-
-        await browser.close_code()
-
-    told = [line for line in caplog.records if "has failed" in line.message]
-    assert [line.levelname for line in told] == ["ERROR"]

@@ -2,7 +2,6 @@
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,6 @@ import pytest
 from iveg.adapters.access_file import AccessFile, earlier_sessions
 from iveg.adapters.files import Form, write_lines
 from iveg.domain.accounts import Access, AccessBook
-from iveg.web.security.roles import Principal
 from iveg.web.security.sessions import Sessions
 from tests.fakes.clock import FakeClock
 
@@ -122,24 +120,6 @@ def test_a_clock_that_was_ahead_makes_no_session_that_never_ends(
     clock.now += 37 * HOUR
 
     assert sessions.find(token) is None
-
-
-def test_a_session_that_was_lowered_is_a_viewers_and_stays_one(start: Restart) -> None:
-    sessions = start()
-    token, other = sessions.open("Ana", "operator"), sessions.open("Eva", "operator")
-    before = sessions.find(token)
-    assert before is not None
-
-    sessions.lower(before)
-    sessions.lower(Principal("program", "program"))
-
-    assert sessions.current(before) == replace(before, role="viewer", wall=True)
-    again = start()
-    found = [one for token in (token, other) if (one := again.find(token))]
-    assert [(one.role, one.wall) for one in found] == [
-        ("viewer", True),
-        ("operator", False),
-    ]
 
 
 def test_sessions_of_earlier_versions_stay(tmp_path: Path, clock: FakeClock) -> None:
