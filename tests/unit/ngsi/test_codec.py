@@ -65,21 +65,6 @@ def test_the_papers_listing_1_is_accepted_as_it_stands() -> None:
     assert frame.detections[0].frame_id is None
 
 
-def test_a_single_box_and_a_list_of_boxes_are_both_accepted() -> None:
-    sides = ("xmin", "xmax", "ymin", "ymax", "zmin", "zmax")
-    box = {
-        "class_id": "farmer",
-        "probability": 1,
-        "position": dict.fromkeys(sides, 1.0),
-    }
-    (one,) = entity(bounding_boxes=box)
-    (many,) = entity(bounding_boxes=[box, box])
-
-    assert isinstance(one, DetectionFrame)
-    assert isinstance(many, DetectionFrame)
-    assert (len(one.detections), len(many.detections)) == (1, 2)
-
-
 def test_the_agents_opinion_and_the_robots_answer_are_told_apart() -> None:
     status, answer = entity(
         cmd_status="OK", cmd_info={"id": "01A", "r": "LATCHED", "boot": "b", "seq": 1}
@@ -217,20 +202,11 @@ def test_feedback_is_written_as_the_contract_says() -> None:
     }
 
 
-@pytest.mark.parametrize(
-    "limits",
-    [
-        {"speed_limits": {"AGI": {"speed_factor": 0.5, "reason": "person"}}},
-        {
-            "speed_limits": {"AGI": {"speed_factor": 0.5, "reason": "person"}},
-            "clear": ["AGI"],
-        },
-    ],
-)
-def test_a_speed_limit_is_read_and_goes_before_a_clear_of_the_same_robot(
-    limits: dict[str, object],
-) -> None:
-    feedback = codec.read_feedback(orjson.dumps({"robot_id": "AGI", **limits}))
+def test_a_speed_limit_goes_before_a_clear_of_the_same_robot() -> None:
+    limits = {"AGI": {"speed_factor": 0.5, "reason": "person"}}
+    said = {"robot_id": "AGI", "speed_limits": limits, "clear": ["AGI"]}
+
+    feedback = codec.read_feedback(orjson.dumps(said))
 
     assert feedback.speed_limits == {"AGI": SpeedLimit(0.5, "person")}
 
@@ -256,15 +232,10 @@ def test_a_backlog_is_told_in_seconds_up_to_a_minute(lag: float, told: float) ->
 def test_a_backlog_that_cannot_be_read_costs_no_speed_limit(
     told: object, read: float | None
 ) -> None:
-    feedback = codec.read_feedback(
-        orjson.dumps(
-            {
-                "robot_id": "AGI",
-                "speed_limits": {"AGI": {"speed_factor": 0.5}},
-                "backlog": told,
-            }
-        )
-    )
+    limits = {"AGI": {"speed_factor": 0.5}}
+    said = {"robot_id": "AGI", "speed_limits": limits, "backlog": told}
+
+    feedback = codec.read_feedback(orjson.dumps(said))
 
     assert feedback.backlog_s == read
     assert feedback.speed_limits["AGI"].speed_factor == 0.5
@@ -277,17 +248,20 @@ def test_every_measure_carries_its_stamp_at_the_top_level_too() -> None:
 
 
 @pytest.mark.parametrize(
-    "obstacle",
+    ("part", "told"),
     [
-        {"x": 1e9, "y": 0.0, "width_m": 0.4, "moved": True},
-        {"x": 0.0, "y": 0.0, "width_m": -0.1, "moved": True},
-        {"x": 0.0, "y": 0.0, "moved": True},
-        "somebody",
+        ("obstacle", {"x": 1e9, "y": 0.0, "width_m": 0.4, "moved": True}),
+        ("obstacle", {"x": 0.0, "y": 0.0, "width_m": -0.1, "moved": True}),
+        ("obstacle", {"x": 0.0, "y": 0.0, "moved": True}),
+        ("obstacle", "somebody"),
+        ("peer_scans", {"every": 1}),
     ],
 )
-def test_an_obstacle_that_cannot_be_read_costs_no_report(obstacle: object) -> None:
+def test_what_is_told_beside_a_report_and_cannot_be_read_costs_no_report(
+    part: str, told: object
+) -> None:
     said = orjson.loads(codec.write_measure(safety_report()))
-    said["safety_state"]["obstacle"] = obstacle
+    said["safety_state"][part] = told
     reading = codec.read_measure("AGI_safety", orjson.dumps(said))
 
     assert reading.problems == ()

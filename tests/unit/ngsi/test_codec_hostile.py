@@ -51,26 +51,13 @@ def test_f27_what_is_no_number_in_range_is_refused_and_not_made_one(text: str) -
     assert problem.source.startswith("AGI")
 
 
-def test_a_box_without_probability_or_position_is_counted_not_guessed() -> None:
-    frame = boxes(
-        BOX,
-        {name: value for name, value in BOX.items() if name != "probability"},
-        {name: value for name, value in BOX.items() if name != "position"},
-        "no box at all",
-    )
-
-    assert len(frame.detections) == 1
-    assert len(frame.unread) == 3
-
-
-@pytest.mark.parametrize("named", ["frame_id", "null", "empty"])
-def test_a_box_that_names_no_frame_is_read_without_one(named: str) -> None:
+@pytest.mark.parametrize("named", [{}, {"frame_id": None}, {"frame_id": "\u0000"}])
+def test_a_box_that_names_no_frame_is_read_without_one(
+    named: dict[str, object],
+) -> None:
     bare = {name: value for name, value in BOX.items() if name != "frame_id"}
-    said = {"frame_id": bare, "null": {**bare, "frame_id": None}}
 
-    frame = boxes(said.get(named, {**bare, "frame_id": "\u0000"}))
-
-    assert [one.frame_id for one in frame.detections] == [None]
+    assert [one.frame_id for one in boxes({**bare, **named}).detections] == [None]
 
 
 @pytest.mark.parametrize(
@@ -102,16 +89,14 @@ def test_f28_a_hundred_thousand_brackets_are_refused_at_once(bracket: bytes) -> 
     assert time.thread_time() - started < 0.1
 
 
-@pytest.mark.parametrize(("levels", "refused"), [(32, False), (33, True), (900, True)])
-def test_the_limit_is_thirty_two_levels(levels: int, refused: bool) -> None:
-    body = b"[" * levels + b"]" * levels
-    reasons = []
-    try:
-        codec.load_json(body)
-    except UnreadableError as error:
-        reasons.append(error.reason)
+@pytest.mark.parametrize("levels", [33, 900])
+def test_the_limit_is_thirty_two_levels(levels: int) -> None:
+    codec.load_json(b"[" * 32 + b"]" * 32)
 
-    assert (reasons == ["too_deep"]) is refused
+    with pytest.raises(UnreadableError) as refused:
+        codec.load_json(b"[" * levels + b"]" * levels)
+
+    assert refused.value.reason == "too_deep"
 
 
 def test_f26_five_megabytes_of_points_are_refused() -> None:
@@ -129,10 +114,7 @@ def test_f26_five_megabytes_of_points_are_refused() -> None:
 @pytest.mark.parametrize(
     ("sent", "kept"),
     [
-        ("farmer", "farmer"),
-        ("far\u0000mer", "farmer"),
         ("\u202efarmer\u2066", "farmer"),
-        ("a\nb\r\tc", "abc"),
         ("e\u0301", "\u00e9"),
         ("x" * 10_000, "x" * 64),
     ],
@@ -202,9 +184,7 @@ def test_one_bad_entity_does_not_hurt_its_neighbours() -> None:
 @pytest.mark.parametrize(
     "body",
     [
-        b"[]",
         b'{"subscriptionId": 1, "data": []}',
-        b'{"subscriptionId": "s"}',
         b'{"subscriptionId": "s", "data": [1]}',
         b"\xff\xfe",
         b'{"subscriptionId": "s", "data": []}trailing',
@@ -215,18 +195,18 @@ def test_what_is_no_notification_is_unreadable(body: bytes) -> None:
         codec.read_notification(body)
 
 
-@pytest.mark.parametrize("payload", [b"", b"null", b"[]", b"7", b"stop", b"\x00"])
-def test_what_is_no_measure_or_answer_is_a_problem(payload: bytes) -> None:
-    assert codec.read_measure("AGI", payload).problems
-    assert codec.read_answer("AGI", payload).problems
+CROWD = {f"R{number}": {"speed_factor": 1.0} for number in range(257)}
 
 
 @pytest.mark.parametrize(
-    "payload", [b"", b"{}", b"[]", b'{"robot_id": 7}', b'{"robot_id": "A", "seen": 1}']
-)
-def test_what_is_no_feedback_counts_as_none(payload: bytes) -> None:
+    "said",
+    [{}, [], {"robot_id": 7}, {"robot_id": "A", "seen": 1},
+     {"robot_id": "AGI", "speed_limits": CROWD}],
+    ids=["nothing", "a list", "no name", "no counts", "more robots than a fleet has"],
+)  # fmt: skip
+def test_what_is_no_feedback_counts_as_none(said: object) -> None:
     with pytest.raises(UnreadableError):
-        codec.read_feedback(payload)
+        codec.read_feedback(orjson.dumps(said))
 
 
 @pytest.mark.parametrize(
@@ -284,63 +264,50 @@ def test_a_message_that_names_another_robot_than_its_topic_is_refused(
         assert bool(reading.observations) is not refused
 
 
-def test_a_picture_of_another_robot_is_a_refused_frame() -> None:
-    body = {"bounding_boxes": [BOX], "detection_header": HEADER | {"robot_id": "AGII"}}
-
-    reading = codec.read_measure("AGI_yolox_bounding_boxes", orjson.dumps(body))
-
-    assert reading.observations == (RefusedFrame("AGI"),)
-    assert [one.reason for one in reading.problems] == ["another_robot"]
-
-
-def test_feedback_about_more_robots_than_a_fleet_has_counts_as_none() -> None:
-    limits = {f"R{number}": {"speed_factor": 1.0} for number in range(257)}
-    with pytest.raises(UnreadableError):
-        codec.read_feedback(orjson.dumps({"robot_id": "AGI", "speed_limits": limits}))
-
-
 # --- frames that cannot be read --------------------------------------------------
 
 HEADER = {"boot": "b", "seq": 1, "stamp": "2026-11-21T03:31:20.000Z"}
 
 
 @pytest.mark.parametrize(
-    "attributes",
+    "said",
     [
         {"bounding_boxes": [BOX] * 257, "detection_header": HEADER},
         {"bounding_boxes": [BOX], "detection_header": HEADER | {"stamp": 17e8}},
+        {"bounding_boxes": [BOX], "detection_header": HEADER | {"robot_id": "AGII"}},
         {"bounding_boxes": "none", "detection_header": HEADER},
         {"class": "farmer", "conf": 0.9, "timestamp": 5},
+        [],
+        b"{",
+        b'{"bounding_boxes": [NaN]}',
     ],
 )
 def test_a_frame_that_cannot_be_read_is_refused_and_never_an_empty_picture(
-    attributes: dict[str, object],
+    said: object,
 ) -> None:
-    reading = codec.read_attributes("AGI", attributes)
+    payload = said if isinstance(said, bytes) else orjson.dumps(said)
+
+    reading = codec.read_measure("AGI_yolox_bounding_boxes", payload)
 
     assert reading.observations == (RefusedFrame("AGI"),)
     assert len(reading.problems) == 1
 
 
-@pytest.mark.parametrize("payload", [b"{", b"[]", b'{"bounding_boxes": [NaN]}'])
-def test_bytes_of_a_detector_that_are_no_measure_are_a_refused_frame(
-    payload: bytes,
-) -> None:
-    reading = codec.read_measure("AGI_yolox_bounding_boxes", payload)
-
-    assert reading.observations == (RefusedFrame("AGI"),)
-
-
 def test_a_bad_box_keeps_the_good_ones_and_tells_its_class() -> None:
-    unsure: dict[str, object] = {**BOX, "probability": 95}
-    unplaced = {**BOX, "class_id": "tomato", "frame_id": "unplaced"}
-    boxes = [BOX, unsure, unplaced, {**unsure, "class_id": 7}]
+    turned = {**dict.fromkeys(("ymin", "ymax", "zmin", "zmax"), 0.0), "xmin": 2.0}
+    bad: dict[str, dict[str, object]] = {
+        "unsure": {"probability": 95},
+        "no position": {"position": None},
+        "ends before it begins": {"position": {**turned, "xmax": 1.0}},
+        "unplaced": {"frame_id": "unplaced"},
+    }
+    told = [{**BOX, "class_id": name, **changes} for name, changes in bad.items()]
+    unsure = {"class_id": "farmer", "position": BOX["position"]}
 
-    (frame,) = codec.read_attributes("AGI", {"bounding_boxes": boxes}).observations
+    frame = boxes(BOX, *told, unsure, {**unsure, "class_id": 7}, "no box at all")
 
-    assert isinstance(frame, DetectionFrame)
     assert len(frame.detections) == 1
-    assert frame.unread == ("farmer", "tomato", None)
+    assert frame.unread == (*bad, "farmer", None, None)
 
 
 # --- scans that no laser makes -----------------------------------------------------
@@ -369,13 +336,3 @@ def test_a_scan_that_no_laser_makes_is_refused_with_its_reason(
     assert bool(reading.observations) is readable
     reasons = [one.reason for one in reading.problems]
     assert reasons == ([] if readable else ["bad_lidar_header"])
-
-
-def test_a_box_whose_side_ends_before_it_begins_cannot_be_used() -> None:
-    sides = dict.fromkeys(("ymin", "ymax", "zmin", "zmax"), 0.0)
-    box = {**BOX, "position": {**sides, "xmin": 2.0, "xmax": 1.0}}
-
-    (frame,) = codec.read_attributes("AGI", {"bounding_boxes": [box]}).observations
-
-    assert isinstance(frame, DetectionFrame)
-    assert frame.unread == ("farmer",)

@@ -13,7 +13,7 @@ from iveg.domain.geometry import Pose2D
 from iveg.domain.peer_scan import PeerScan, peer_scan_of
 from iveg.ngsi import codec
 from iveg.ngsi.codec.feedback import LARGEST
-from tests.builders import origin, safety_report, scan
+from tests.builders import origin, scan
 
 ROUND = scan(
     ranges=[2.0 + n % 7 for n in range(720)],
@@ -77,12 +77,3 @@ def test_what_is_wrong_is_refused(changes: dict[str, Any], reason: str) -> None:
         codec.read_peer_scan("AGI", sent(**changes))
 
     assert refused.value.reason == reason
-
-
-def test_a_wish_that_cannot_be_read_costs_no_report() -> None:
-    said = orjson.loads(codec.write_measure(safety_report()))
-    said["safety_state"]["peer_scans"] = {"every": 1}
-    reading = codec.read_measure("AGI_safety", orjson.dumps(said))
-
-    assert reading.problems == ()
-    assert reading.observations == (safety_report(),)

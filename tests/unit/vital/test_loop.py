@@ -108,8 +108,6 @@ def test_heartbeats_keep_their_pace_while_ticks_come_now_late_now_in_time() -> N
     assert heartbeats == pytest.approx(40 * TICK_S / HEARTBEAT_S, abs=1)
 
 
-
-
 def test_the_heartbeat_that_came_back_is_evidence_for_the_chain() -> None:
     desk = Desk()
     desk.clock.now = 1.0
