@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Literal
 
-import orjson
 from hypothesis import strategies as st
 
 from iveg.domain.feedback import Feedback, SpeedLimit
@@ -94,12 +93,12 @@ class World(Rig):
             getattr(self, event.name)(*event.values)
         return self
 
-    # --- bookkeeping: every call of the machine goes through perform ---------------
+    # --- bookkeeping ----------------------------------------------------------------
 
-    def watched(self, call: Callable[[], tuple[Effect, ...]]) -> tuple[Effect, ...]:
+    def call(self, machine: Callable[[], tuple[Effect, ...]]) -> tuple[Effect, ...]:
         before, challenge = self.machine.holds, self.machine.challenge
         self.challenges = [*self.challenges, challenge][-20:]
-        effects = call()
+        effects = machine()
         self.transitions.append(
             Transition(
                 self.did,
@@ -124,32 +123,17 @@ class World(Rig):
             self.sent_at[seq] = self.now
         return done
 
-    def step(self) -> None:
-        self.now = round(self.now + 0.05, 6)
-        machine = self.machine
-        if self.odometry:
-            self.watched(lambda: machine.odometry(self.pose, self.speed, self.now))
-        if self.speaks and self.now - self._spoke_at >= 0.199:
-            self._spoke_at = self.now
-            self.hear()
-        wished = self.wished
-        if wished is None:
-            self.note_wish(None)
-            self.watched(lambda: machine.tick(self.now))
-        else:
-            self.note_wish(wished)
-            self.watched(lambda: machine.request_twist(wished, self.now))
-
-    def note_wish(self, wished: Twist2D | None) -> None:
-        """Since when upstream has been at rest, kept apart from the gate's own view."""
-        if wished is not None:
+    def ask(self) -> None:
+        """Note since when upstream is at rest, apart from the gate's own view."""
+        if self.wished is not None:
             self.wish_at = self.now
-        if wished is not None and wished != REST:
+        if self.wished is not None and self.wished != REST:
             self.rest_since = None
         elif self.rest_since is None and (
-            wished is not None or self.now - self.wish_at > 0.5
+            self.wished is not None or self.now - self.wish_at > 0.5
         ):
             self.rest_since = self.now
+        super().ask()
 
     def hear(self, feedback: Feedback | None = None, topic: str = "AGII") -> None:
         told = feedback or self.feedback()
@@ -157,12 +141,12 @@ class World(Rig):
         seen = self.sent_at.get(told.seen.get("AGI", -1))
         if seen is not None:
             self.heard = seen if self.heard is None else max(seen, self.heard)
-        self.watched(lambda: self.machine.feedback(topic, told, self.now))
+        super().hear(told, topic)
 
     def deliver(self, payload: bytes) -> None:
         self.commands.append(payload)
         self.payload = payload
-        self.watched(lambda: self.machine.command(payload, self.now))
+        self.command(payload)
 
     # --- events ---------------------------------------------------------------------
 
@@ -179,18 +163,18 @@ class World(Rig):
         remote = sorted(self.machine.holds.remote)
         everything = [hold.id for hold in self.machine.holds.holds]
         ids = {"fewer": remote[1:], "all": everything}.get(kind, remote)
-        old = next((c for c in self.challenges if c != self.machine.challenge), "none")
-        ch = old if kind == "old" else self.machine.challenge
-        self.deliver(release(ids or ["nobody"], ch, self.attempt()))
+        named = f"t{len(self.commands)}"
+        self.deliver(release(ids or ["nobody"], self.challenge(kind), named))
 
     def ask_resume(self, kind: str) -> None:
-        old = next((c for c in self.challenges if c != self.machine.challenge), "none")
-        ch = old if kind == "old" else self.machine.challenge
-        self.deliver(resume(ch, self.attempt()))
+        named = f"t{len(self.commands)}"
+        self.deliver(resume(self.challenge(kind), named))
 
-    def attempt(self) -> str:
-        """A name for an order."""
-        return f"t{len(self.commands)}"
+    def challenge(self, kind: str) -> str:
+        """An earlier one if it is to be ``old``, else the present one."""
+        now = self.machine.challenge
+        earlier = next((one for one in self.challenges if one != now), "none")
+        return earlier if kind == "old" else now
 
     def again(self, which: int) -> None:
         for payload in self.commands[which % max(1, len(self.commands)) :][:1]:
@@ -201,19 +185,13 @@ class World(Rig):
             self.hear(feedback)
 
     def keep_desired_state(self, desired: str, ids: list[str]) -> None:
-        payload = orjson.dumps({"desired": desired, "ids": ids})
-        self.watched(lambda: self.machine.desired(payload, self.now))
+        self.level(desired, *ids)
 
     def local(self, source: Literal["hw", "bumper"]) -> None:
-        kind: str = source
-        self.watched(
-            lambda: self.machine.local_hold(
-                "hw" if kind == "hw" else "bumper", self.now
-            )
-        )
+        self.call(lambda: self.machine.local_hold(source, self.now))
 
     def crew(self) -> None:
-        self.watched(lambda: self.machine.release_locally(self.now))
+        self.call(lambda: self.machine.release_locally(self.now))
 
     def iveg(self, speaks: bool) -> None:
         self.speaks = speaks
@@ -240,7 +218,7 @@ class World(Rig):
         self.machine = self.start()
         self.sent_at, self.heard, self.rest_since = {}, None, None
         self.wish_at = -1e9
-        self.watched(lambda: self.machine.tick(self.now))
+        self.call(lambda: self.machine.tick(self.now))
         self.boots.append(self.transitions[-1])
 
     def cut(self, name: str, performed: int) -> None:

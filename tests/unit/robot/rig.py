@@ -1,7 +1,8 @@
 """A safety machine on a bench: its own clock, an obedient drive, a small iVeg."""
 
+import asyncio
 import itertools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import orjson
@@ -15,6 +16,7 @@ from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
 from iveg.robot.orders import Drive, Effect, Persist, Report, SendAnswer
 from iveg.robot.safety import SafetyMachine
+from tests.patience import PATIENCE_S
 
 STEP_S = 0.05
 _ATTEMPTS = itertools.count(1)
@@ -33,30 +35,26 @@ def person(
     observer: str = "AGII",
     velocity: tuple[float, float] | None = None,
 ) -> FeedbackAlert:
+    place = x, y, 0.9
     return FeedbackAlert(
-        decision_id,
-        "",
-        class_,
-        class_id,
-        0.9,
-        (x, y, 0.9),
-        radius_m,
-        observer,
-        velocity,
+        decision_id, "", class_, class_id, 0.9, place, radius_m, observer, velocity
     )
 
 
+async def until(true: Callable[[], object]) -> None:
+    async with asyncio.timeout(PATIENCE_S):
+        while not true():  # noqa: ASYNC110 - of no event
+            await asyncio.sleep(0.002)
+
+
 def release(ids: list[str], challenge: str, attempt: str = "") -> bytes:
-    named = attempt or _new_attempt()
+    named = attempt or f"try-{next(_ATTEMPTS)}"
     return codec.write_command(codec.write_release(ids, challenge, named))
 
 
 def resume(challenge: str, attempt: str = "") -> bytes:
-    return codec.write_command(codec.write_resume(challenge, attempt or _new_attempt()))
-
-
-def _new_attempt() -> str:
-    return f"try-{next(_ATTEMPTS)}"
+    named = attempt or f"try-{next(_ATTEMPTS)}"
+    return codec.write_command(codec.write_resume(challenge, named))
 
 
 def stop(hold_id: str) -> bytes:
@@ -113,15 +111,25 @@ class Rig:
 
     def step(self) -> None:
         self.now = round(self.now + STEP_S, 6)
+        machine = self.machine
         if self.odometry:
-            self.perform(self.machine.odometry(self.pose, self.speed, self.now))
+            self.call(lambda: machine.odometry(self.pose, self.speed, self.now))
         if self.speaks and self.now - self._spoke_at >= 0.199:
             self._spoke_at = self.now
             self.hear()
-        if self.wished is None:
-            self.perform(self.machine.tick(self.now))
+        self.ask()
+
+    def ask(self) -> None:
+        """What upstream wishes for, if it says anything."""
+        machine, wished = self.machine, self.wished
+        if wished is None:
+            self.call(lambda: machine.tick(self.now))
         else:
-            self.perform(self.machine.request_twist(self.wished, self.now))
+            self.call(lambda: machine.request_twist(wished, self.now))
+
+    def call(self, machine: Callable[[], tuple[Effect, ...]]) -> tuple[Effect, ...]:
+        """One call of the machine, and what follows from it."""
+        return self.perform(machine())
 
     def perform(self, effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
         for effect in effects:
@@ -138,9 +146,8 @@ class Rig:
     # --- what happens to it -----------------------------------------------------
 
     def hear(self, feedback: Feedback | None = None, topic: str = "AGII") -> None:
-        self.perform(
-            self.machine.feedback(topic, feedback or self.feedback(), self.now)
-        )
+        told = feedback or self.feedback()
+        self.call(lambda: self.machine.feedback(topic, told, self.now))
 
     def feedback(self, **parts: object) -> Feedback:
         self.feedback_seq += 1
@@ -155,7 +162,7 @@ class Rig:
         return Feedback(**(values | parts))  # type: ignore[arg-type]
 
     def command(self, payload: bytes) -> CommandAnswer:
-        effects = self.perform(self.machine.command(payload, self.now))
+        effects = self.call(lambda: self.machine.command(payload, self.now))
         return next(one.answer for one in effects if isinstance(one, SendAnswer))
 
     def stop(self, hold_id: str = "01STOP") -> CommandAnswer:
@@ -171,7 +178,7 @@ class Rig:
 
     def level(self, desired: str, *ids: str) -> None:
         payload = orjson.dumps({"desired": desired, "ids": ids})
-        self.perform(self.machine.desired(payload, self.now))
+        self.call(lambda: self.machine.desired(payload, self.now))
 
     def drive_on(self) -> "Rig":
         """Bring it to full speed: released, resumed, neutral, ramped."""
@@ -210,9 +217,6 @@ class Rig:
     @property
     def reason(self) -> str:
         return self.machine.cap.reason
-
-    def times(self, kind: type[Effect]) -> list[float]:
-        return [at for at, one in self.log if isinstance(one, kind)]
 
     def factor_changes(self) -> int:
         told = [report.speed_factor for report in self.reports]
