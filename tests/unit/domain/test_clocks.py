@@ -66,16 +66,13 @@ def test_a_slow_transport_is_never_taken_for_a_clock(delay: float) -> None:
     assert robot.offset(4.0) == pytest.approx(0.001, abs=1e-6)
 
 
-def test_fiware_alone_is_never_younger_than_the_lag_of_our_probe() -> None:
+@pytest.mark.parametrize("lag", [None, 24.5])
+def test_fiware_alone_is_as_old_as_our_probe_or_unknown(lag: float | None) -> None:
     robot = Robot()
 
-    found = [robot.send(0.1 * n, 25.0, FIWARE.id, lag=24.5) for n in range(20)]
+    found = [robot.send(0.1 * n, 25.0, FIWARE.id, lag=lag) for n in range(20)]
 
-    assert found == [24.5] * 20
-
-
-def test_fiware_alone_is_unknown_until_a_probe_came_back() -> None:
-    assert Robot().send(0.0, 25.0, FIWARE.id, lag=None) is None
+    assert found == [lag] * 20
 
 
 def test_direct_messages_of_long_ago_do_not_date_what_fiware_brings() -> None:
@@ -211,10 +208,13 @@ def test_a_frame_that_is_stamped_by_another_clock_is_of_unknown_age(
 ) -> None:
     robot = Robot()
     robot.send(0.0)
+    assert robot.send(0.0, 2.0, kind=DetectionFrame) == pytest.approx(2.0), "late"
 
     robot.ahead_s = apart_s
     assert robot.send(0.1, kind=DetectionFrame) is None
     assert robot.estimate.detector_apart_at == at(0.1).mono
+    robot.ahead_s = 0.0
+    assert robot.send(1.0) == pytest.approx(0.0), "no pose is old for it"
 
 
 def test_a_clock_that_stays_apart_is_accused() -> None:
@@ -241,21 +241,3 @@ def test_frames_behind_a_gap_accuse_no_clock() -> None:
 
     assert robot.estimate.detector_apart_at is not None
     assert robot.estimate.detector_accused_at is None
-
-
-def test_a_detectors_clock_makes_no_pose_old() -> None:
-    robot = Robot()
-    robot.send(0.0)
-    robot.ahead_s = 600.0
-    for number in range(10):
-        robot.send(0.1 * number, kind=DetectionFrame)
-
-    robot.ahead_s = 0.0
-    assert robot.send(1.0) == pytest.approx(0.0)
-
-
-def test_a_frame_that_is_late_by_the_clock_of_odometry_is_late() -> None:
-    robot = Robot()
-    robot.send(0.0)
-
-    assert robot.send(0.0, 2.0, kind=DetectionFrame) == pytest.approx(2.0)

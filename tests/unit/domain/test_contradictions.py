@@ -15,13 +15,7 @@ from iveg.domain.observations import (
 )
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from iveg.domain.world import World
-from tests.builders import (
-    at,
-    fleet_of,
-    odometry,
-    origin,
-    safety_report,
-)
+from tests.builders import at, fleet_of, odometry, origin, safety_report
 
 BOUNDS = Rectangle(0.0, 0.0, 50.0, 30.0)
 STEP_S = 0.1
@@ -126,23 +120,6 @@ def _gliding(robot: Robot) -> None:
     robot.drive(STEP_S, speed=0.0)
 
 
-def _dead_reckoned(robot: Robot) -> None:
-    robot.wait(STEP_S)
-    robot.say(odometry(x=robot.x, y=5.0, linear=0.5, origin=robot.origin()))
-
-
-def _sliding(robot: Robot) -> None:
-    robot.x += 0.03
-    robot.wait(STEP_S)
-    robot.say(odometry(x=robot.x, y=5.0, yaw=1.5, linear=0.0, origin=robot.origin()))
-
-
-def _turning(robot: Robot) -> None:
-    robot.wait(STEP_S)
-    said = odometry(x=robot.x, y=5.0, linear=0.0, angular=0.5, origin=robot.origin())
-    robot.say(said)
-
-
 LIES: list[tuple[str, Callable[[Robot], None]]] = [
     ("pose_outside", _outside),
     ("too_fast", _fast),
@@ -150,9 +127,6 @@ LIES: list[tuple[str, Callable[[Robot], None]]] = [
     ("too_fast", _fast_report),
     ("jumped", _jumping),
     ("pose_against_twist", _gliding),
-    ("pose_against_twist", _dead_reckoned),
-    ("sideways", _sliding),
-    ("yaw_against_turn", _turning),
 ]
 
 

@@ -7,29 +7,18 @@ import pytest
 from iveg.domain.alerts import of_robot
 from iveg.domain.decisions import Decisions, SlowdownDecision
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.observations import FeedbackRef, SafetyReport
+from iveg.domain.observations import FeedbackRef
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.zones import Zone, ZoneEntry
 from iveg.domain.tracking.person import Sighting
 from iveg.domain.transports import DIRECT
 from iveg.domain.world import World
-from tests.builders import (
-    START,
-    at,
-    odometry,
-    origin,
-    received,
-    safety_report,
-)
+from tests.builders import START, at, odometry, origin, received, safety_report
 
 LOOK = Sighting("AGI", 1.0, 0.0, 0.9, START, "farmer", 0.94)
 
 
-def entry(
-    *,
-    speed: float = 0.8,
-    sighting: Sighting | None = LOOK,
-) -> ZoneEntry:
+def entry(sighting: Sighting | None = LOOK) -> ZoneEntry:
     zone = Zone("person", "P1", "AGI", 1.0, 0.0, 2.0, 2.0, sighting)
     if sighting is None:
         zone = Zone("robot", "AGI", "AGI", 1.0, 0.0, 2.0, 2.0)
@@ -39,28 +28,24 @@ def entry(
         zone,
         entered=START,
         entered_m=1.43,
-        speed_before=speed,
+        speed_before=0.8,
         in_sight=False,
         distance_m=1.43,
     )
 
 
-def decision(**parts: object) -> SlowdownDecision:
-    return SlowdownDecision(entry(**parts), DetectionRule())  # type: ignore[arg-type]
+def decision(sighting: Sighting | None = LOOK) -> SlowdownDecision:
+    return SlowdownDecision(entry(sighting), DetectionRule())
 
 
-def slow() -> SafetyReport:
-    return safety_report("AGII", speed_factor=0.5, reason="person")
+def obeyed(one: SlowdownDecision, after: float = 0.2) -> SlowdownDecision:
+    slow = safety_report("AGII", speed_factor=0.5, reason="person")
+    return one.published(at(0.01)).reported(slow, at(after)).slowed(0.4, at(after))
 
 
 def verdicts(one: SlowdownDecision, after: float) -> dict[str, str]:
     """Of a robot that has been heard all the time (s)."""
     return {link.name: link.verdict for link in one.aged(after).links()}
-
-
-def obeyed(one: SlowdownDecision, after: float = 0.2) -> SlowdownDecision:
-    done = one.published(at(0.01)).reported(slow(), at(after))
-    return done.slowed(0.4, at(after))
 
 
 def test_every_link_has_its_time_and_value() -> None:
@@ -75,8 +60,15 @@ def test_every_link_has_its_time_and_value() -> None:
     assert links["observed"].at == at(0.2).wall
 
 
-def test_links_that_had_not_come_at_the_end_are_missing() -> None:
-    assert verdicts(decision().closed(at(0.5)), 0.6)["applied"] == "missing"
+def test_what_did_not_come_in_time_or_until_the_end_is_missing() -> None:
+    one = decision().reported(safety_report("AGII", speed_factor=1.0), at(0.1))
+
+    assert one.aged(1.9) is one
+    aged = one.aged(2.0)
+    assert aged.waited_out
+    assert aged.aged(9.0) is aged
+    assert verdicts(aged, 2.0)["applied"] == "missing"
+    assert verdicts(one.closed(at(0.5)), 0.6)["applied"] == "missing"
 
 
 @pytest.mark.parametrize(("after", "verdict"), [(1.0, "ok"), (1.01, "late")])
@@ -88,12 +80,6 @@ def test_a_peers_own_odometry_needs_no_detection() -> None:
     found = verdicts(decision(sighting=None), 0.0)
 
     assert (found["detection"], found["filter"]) == ("n/a", "n/a")
-
-
-def test_a_report_at_full_speed_is_no_obedience() -> None:
-    faster = safety_report("AGII", speed_factor=1.0)
-
-    assert decision().reported(faster, at(0.1)).applied is None
 
 
 # --- robots -----------------------------------------------------------------------
@@ -167,16 +153,6 @@ def test_old_ended_decisions_make_room_and_open_ones_never_do() -> None:
     assert book.get("open") is opened
     assert book.get("ended-0") is None
     assert book.get("ended-4") is not None
-
-
-def test_what_did_not_come_in_time_is_missing_from_then_on() -> None:
-    one = decision()
-
-    assert one.aged(1.9) is one
-    aged = one.aged(2.0)
-    assert aged.waited_out
-    assert aged.aged(9.0) is aged
-    assert verdicts(aged, 2.0)["applied"] == "missing"
 
 
 def test_what_was_open_when_iveg_went_away_is_unknown_and_says_when() -> None:

@@ -15,25 +15,20 @@ from tests.builders import at
 OUT = OutOfService("maria", 1.0, "boot-a")
 
 
-def looked(moment: float = 0.0) -> DetectorEvidence:
+def looked(moment: float | None) -> DetectorEvidence:
     detector = DetectorEvidence()
-    detector.note_whole(at(moment).mono)
+    detector.note_whole(None if moment is None else at(moment).mono)
     return detector
 
 
-def frame(*unread: str | None) -> DetectionFrame:
-    return DetectionFrame("AGI", Origin(), (), unread)
-
-
-@pytest.mark.parametrize(("age", "missing"), [(1.0, False), (1.01, True)])
-def test_a_whole_frame_proves_it_for_a_second(age: float, *, missing: bool) -> None:
-    assert looked().is_missing(at(age)) is missing
-
-
-def test_a_frame_whose_age_nobody_knows_proves_nothing() -> None:
-    detector = DetectorEvidence()
-    detector.note_whole(None)
-    assert detector.is_missing(at(0.0))
+@pytest.mark.parametrize(
+    ("seen", "age", "missing"),
+    [(0.0, 1.0, False), (0.0, 1.01, True), (None, 0.0, True)],
+)
+def test_a_whole_frame_of_known_age_proves_it_for_a_second(
+    seen: float | None, age: float, *, missing: bool
+) -> None:
+    assert looked(seen).is_missing(at(age)) is missing
 
 
 @pytest.mark.parametrize(("age", "missing"), [(1.0, True), (1.01, False)])
@@ -45,12 +40,9 @@ def test_a_flaw_outweighs_whole_frames_for_a_second(
     assert detector.is_missing(at(age)) is missing
 
 
-def test_one_out_of_service_is_not_waited_for() -> None:
-    assert not DetectorEvidence(out_of_service=OUT).is_missing(at(0.0))
-
-
-def test_a_refused_frame_counts_even_out_of_service() -> None:
+def test_one_out_of_service_is_not_waited_for_and_its_refused_frame_counts() -> None:
     detector = DetectorEvidence(out_of_service=OUT)
+    assert not detector.is_missing(at(0.0))
     detector.note_flaw("unreadable", at(0.0))
     assert detector.is_missing(at(0.5))
 
@@ -72,19 +64,23 @@ def test_forty_five_frames_a_second_are_judged_and_no_more() -> None:
     assert admitted == pytest.approx(FRAMES_HZ * 11, abs=1)
 
 
-@pytest.mark.parametrize("class_id", ["farmer", " Husky ", None])
-def test_an_unread_box_that_may_be_of_a_person_or_robot_is_a_flaw(
-    class_id: str | None,
+@pytest.mark.parametrize(
+    ("unread", "unplaced", "has_pose", "flaw"),
+    [
+        ((), 0, True, None),
+        (("tomato",), 0, True, None),
+        (("tomato", "farmer"), 0, True, "unreadable"),
+        ((" Husky ",), 0, True, "unreadable"),
+        ((None,), 0, True, "unreadable"),
+        ((), 1, True, "unreadable"),
+        ((), 1, False, "unplaced"),
+    ],
+)
+def test_a_frame_with_a_box_that_may_be_somebody_and_has_no_place_is_not_whole(
+    unread: tuple[str | None, ...], unplaced: int, has_pose: bool, flaw: str | None
 ) -> None:
-    assert flaw_of(frame("tomato", class_id), DetectionRule()) == "unreadable"
+    frame = DetectionFrame("AGI", Origin(), (), unread)
 
+    found = flaw_of(frame, DetectionRule(), unplaced=unplaced, has_pose=has_pose)
 
-def test_a_tomato_without_depth_is_none() -> None:
-    assert flaw_of(frame("tomato"), DetectionRule()) is None
-
-
-def test_a_frame_with_somebody_whose_place_nobody_knows_is_not_whole() -> None:
-    rule = DetectionRule()
-    assert flaw_of(frame(), rule) is None
-    assert flaw_of(frame(), rule, unplaced=1) == "unreadable"
-    assert flaw_of(frame(), rule, unplaced=1, has_pose=False) == "unplaced"
+    assert found == flaw

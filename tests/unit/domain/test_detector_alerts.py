@@ -10,7 +10,18 @@ from iveg.domain.observations import RefusedFrame
 from iveg.domain.world import World
 from tests.builders import START, at, detection_frame, odometry, origin, received
 
-STARTED = at(-60.0)
+
+def test_out_of_service_it_is_a_notice_and_without_a_detector_nothing() -> None:
+    robot = driving().robot("AGI")
+    robot.detector.out_of_service = OutOfService("maria", 1.0)
+
+    (found,) = alerts.of_detector(robot, at(0.0), started=at(-60.0))
+
+    assert (found.priority, found.key) == ("P3", "alert.detector_out_of_service")
+    world = driving()
+    robot = world.robot("AGI")
+    robot.description = replace(robot.description, has_detector=False)
+    assert keys(world, 0.0) == []
 
 
 def driving(world: World | None = None, now: float = 0.0) -> World:
@@ -28,14 +39,30 @@ def keys(world: World, now: float, started: float = -60.0) -> list[str]:
     return [one.key for one in found]
 
 
-def test_a_detector_that_worked_and_falls_silent_is_told_at_once() -> None:
+def worked() -> World:
+    """AGI's detector has worked at 0."""
     world = driving()
     world.robot("AGI").detector.note_whole(START.mono)
-    driving(world, 1.0)
+    return world
+
+
+def test_a_detector_that_worked_and_falls_silent_is_told_at_once() -> None:
+    world = driving(worked(), 1.0)
 
     assert keys(world, 1.01) == []
     driving(world, 1.1)
     assert keys(world, 1.1) == ["alert.detector_silent"]
+
+
+def test_of_a_robot_that_is_silent_itself_or_just_came_back_it_is_no_news() -> None:
+    world = worked()
+    assert [keys(world, now) for now in (2.0, 4.0)] == [[], []]
+
+    told = []
+    for now in (20.0, 20.5, 21.0, 21.5):
+        told.append(keys(driving(world, now), now))
+
+    assert told == [[], [], [], ["alert.detector_silent"]]
 
 
 @pytest.mark.parametrize(("since", "told"), [(9.9, False), (10.0, True)])
@@ -43,27 +70,6 @@ def test_one_that_never_worked_has_ten_seconds_to_begin(
     since: float, *, told: bool
 ) -> None:
     assert bool(keys(driving(), 0.0, -since)) is told
-
-
-@pytest.mark.parametrize("now", [2.0, 4.0])
-def test_of_a_robot_that_is_late_or_lost_itself_the_detector_is_no_news(
-    now: float,
-) -> None:
-    world = driving()
-    world.robot("AGI").detector.note_whole(START.mono)
-
-    assert keys(world, now) == []
-
-
-def test_of_a_robot_that_has_just_come_back_it_is_no_news_for_a_second() -> None:
-    world = driving()
-    world.robot("AGI").detector.note_whole(START.mono)
-    told = []
-    for now in (20.0, 20.5, 21.0, 21.5):
-        driving(world, now)
-        told.append(keys(world, now))
-
-    assert told == [[], [], [], ["alert.detector_silent"]]
 
 
 def test_a_refused_frame_is_told_for_ten_seconds() -> None:
@@ -101,20 +107,3 @@ def test_a_detector_by_another_clock_is_not_called_silent() -> None:
         frame = detection_frame("AGI", origin=origin(seq, after=now - 600.0))
         world.apply(received(frame, after=now))
         assert keys(world, now) == (["alert.detector_clock"] if now == 2.0 else [])
-
-
-def test_out_of_service_it_is_a_notice_and_not_silence() -> None:
-    world = driving()
-    world.robot("AGI").detector.out_of_service = OutOfService("maria", 1.0)
-
-    (found,) = alerts.of_detector(world.robot("AGI"), at(0.0), started=STARTED)
-
-    assert (found.priority, found.key) == ("P3", "alert.detector_out_of_service")
-
-
-def test_a_robot_without_a_detector_lacks_none() -> None:
-    world = driving()
-    robot = world.robot("AGI")
-    robot.description = replace(robot.description, has_detector=False)
-
-    assert keys(world, 0.0) == []

@@ -19,10 +19,15 @@ def sent(*moments: float) -> ProbeLag:
     return lag
 
 
-def test_nothing_is_known_before_the_first_probe() -> None:
-    lag = ProbeLag()
+def test_before_the_first_came_back_the_lag_is_a_lower_bound_at_most() -> None:
+    none, one = ProbeLag(), sent(0.0)
 
-    assert (lag.lag(at(5.0)), lag.is_known, lag.grows(at(5.0))) == (None, False, False)
+    assert (none.lag(at(5.0)), none.is_known, none.grows(at(5.0))) == (
+        None,
+        False,
+        False,
+    )
+    assert (one.lag(at(3.0)), one.is_known) == (3.0, False)
 
 
 def test_the_newest_probe_that_came_back_tells_the_lag() -> None:
@@ -41,25 +46,13 @@ def test_a_probe_that_is_still_out_counts_with_its_age() -> None:
     assert lag.lag(at(9.0)) == 7.0
 
 
-def test_before_the_first_came_back_the_lag_is_only_a_lower_bound() -> None:
-    lag = sent(0.0)
-
-    assert (lag.lag(at(3.0)), lag.is_known) == (3.0, False)
-
-
-def test_a_probe_that_was_passed_by_a_later_one_counts_no_more() -> None:
-    lag = sent(0.0, 2.0)
-    lag.returned(probe(2), at(2.5))
-
-    assert lag.lag(at(60.0)) == 0.5
-
-
 @pytest.mark.parametrize("later", [probe(1), probe(2), Origin("before", 9)])
 def test_a_copy_a_straggler_or_a_probe_of_an_earlier_life_says_nothing(
     later: Origin,
 ) -> None:
     lag = sent(0.0, 2.0)
     lag.returned(probe(2), at(2.5))
+    assert lag.lag(at(30.0)) == 0.5, "the first was passed by"
     lag.returned(later, at(40.0))
 
     assert lag.lag(at(40.0)) == 0.5

@@ -47,14 +47,9 @@ def take(
     return rest.odometry(sample, UNMOVED, moment, age_s)
 
 
-def moving(
-    rest: Standstill, *moments: float, late: float = 0.0, boot: str = "a"
-) -> list[bool | None]:
+def moving(rest: Standstill, *moments: float, late: float = 0.0) -> list[bool | None]:
     """What moving samples of odometry come to, measured at these moments."""
-    return [
-        take(rest, arrived(mono, late), said(mono, boot=boot), moves=True)
-        for mono in moments
-    ]
+    return [take(rest, arrived(mono, late), said(mono), moves=True) for mono in moments]
 
 
 # --- the rest ---------------------------------------------------------------------
@@ -110,19 +105,21 @@ def test_motion_from_before_the_rest_changes_nothing_however_late(late: float) -
     assert rest.rested(arrived(11.2), said(11.2))
 
 
-def test_later_motion_contradicts_with_three_samples() -> None:
-    assert moving(stood(), 11.1, 11.2, 11.3) == [False, False, True]
-
-
-def test_motion_during_the_rest_contradicts_though_it_comes_late() -> None:
-    assert moving(stood(), 10.5, 10.6, 10.7, late=5.0) == [False, False, True]
-
-
-def test_a_rest_that_goes_on_after_a_gap_does_not_excuse_motion_in_the_gap() -> None:
+@pytest.mark.parametrize(
+    ("first", "late"),
+    [(11.1, 0.0), (10.5, 5.0), (11.5, 2.0)],
+    ids=["after the rest", "during it", "in a gap of it"],
+)
+def test_motion_during_or_after_the_rest_contradicts_with_three_samples(
+    first: float, late: float
+) -> None:
     rest = stood()
-    rest.rested(arrived(12.0), said(12.0))
+    if first == 11.5:
+        rest.rested(arrived(12.0), said(12.0))
 
-    assert moving(rest, 11.5, 11.6, 11.7, late=2.0) == [False, False, True]
+    found = moving(rest, first, first + 0.1, first + 0.2, late=late)
+
+    assert found == [False, False, True]
 
 
 @pytest.mark.parametrize("step_s", [HOUR_S, -HOUR_S])

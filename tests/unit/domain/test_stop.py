@@ -32,12 +32,16 @@ def test_a_press_asks_for_stop_on_both_transports_and_sets_the_level() -> None:
 
 
 @pytest.mark.parametrize("transport", ["direct", "fiware"])
-def test_a_transport_that_took_it_makes_it_sent(transport: TransportId) -> None:
+def test_a_transport_that_took_it_makes_it_sent_and_the_robots_answer_delivered(
+    transport: TransportId,
+) -> None:
     bench = pressed()
-
     bench.sent(transport)
-
     assert bench.state == "SENT"
+
+    bench.answer(transport=transport)
+
+    assert bench.state == "DELIVERED"
 
 
 def test_the_robots_answer_through_orion_is_evidence_that_204_does_not_undo() -> None:
@@ -89,15 +93,6 @@ def test_the_next_fiware_request_leaves_two_seconds_after_the_last_came_back() -
 # --- DELIVERED, UNCONFIRMED, STILL_MOVING ----------------------------------------
 
 
-@pytest.mark.parametrize("transport", ["direct", "fiware"])
-def test_the_robots_answer_with_our_id_means_delivered(transport: TransportId) -> None:
-    bench = pressed()
-
-    bench.answer(transport=transport)
-
-    assert bench.state == "DELIVERED"
-
-
 @pytest.mark.parametrize(
     ("result", "hold_id"),
     [("RELEASED", None), ("RESUMED", None), ("REFUSED", None), ("LATCHED", "other")],
@@ -143,7 +138,7 @@ def test_no_word_of_the_robot_for_a_second_means_unconfirmed(first: str) -> None
 @pytest.mark.parametrize(
     ("speed", "limit"), [(0.0, 1.5), (0.5, 2.5), (1.0, 3.5), (9.0, 5.0)]
 )
-def test_delivered_and_not_standing_after_its_braking_time_is_still_moving(
+def test_f40_delivered_and_not_standing_after_its_braking_time_is_still_moving(
     speed: float, limit: float
 ) -> None:
     bench = pressed()
@@ -152,15 +147,6 @@ def test_delivered_and_not_standing_after_its_braking_time_is_still_moving(
     bench.wait(limit - 0.05)
     assert bench.state == "DELIVERED"
     bench.wait(0.1)
-
-    assert bench.state == "STILL_MOVING"
-
-
-def test_f40_a_robot_that_acknowledges_and_drives_on_is_still_moving() -> None:
-    bench = pressed()
-    for _ in range(50):
-        bench.report(bench.ours, linear=0.5)
-        bench.wait(0.1)
 
     assert bench.state == "STILL_MOVING"
 
@@ -208,15 +194,15 @@ def test_the_longest_gap_is_that_of_the_topics_own_period(
     assert bench.state == state
 
 
-@pytest.mark.parametrize("turn", [{"linear": 0.02}, {"angular": -0.02}])
-def test_one_moving_sample_starts_the_standstill_anew(turn: dict[str, float]) -> None:
+@pytest.mark.parametrize(("linear", "angular"), [(0.02, 0.0), (0.0, -0.02)])
+def test_one_moving_sample_starts_the_standstill_anew(
+    linear: float, angular: float
+) -> None:
     bench = pressed()
     for _ in range(10):
         bench.report(bench.ours)
         bench.now += 0.1
-    bench.report(
-        bench.ours, linear=turn.get("linear", 0.0), angular=turn.get("angular", 0.0)
-    )
+    bench.report(bench.ours, linear=linear, angular=angular)
     bench.now += 0.1
     bench.report(bench.ours)
 
@@ -258,24 +244,23 @@ def test_a_standing_robot_is_reminded_every_five_seconds() -> None:
     assert bench.state == "STANDING"
 
 
+def test_a_robot_that_moves_while_standing_is_stopped_again() -> None:
+    bench = standing()
+
+    bench.report(bench.ours, linear=0.3)
+
+    assert (bench.state, bench.changes()[-1]) == ("REQUESTED", "moved")
+
+
 def test_a_hold_that_is_lost_while_standing_is_stopped_again_under_a_new_id() -> None:
     bench = standing()
     lost = bench.ours.id
 
     effects = bench.report(RED_BUTTON)
 
-    assert bench.state == "REQUESTED"
-    assert bench.ours.id != lost
-    assert bench.changes()[-1] == "moved"
-    assert len(sends(effects)) == 2
-
-
-def test_motion_in_the_report_while_standing_is_stopped_again() -> None:
-    bench = standing()
-
-    bench.report(bench.ours, linear=0.3)
-
     assert (bench.state, bench.changes()[-1]) == ("REQUESTED", "moved")
+    assert bench.ours.id != lost
+    assert len(sends(effects)) == 2
 
 
 # --- STALE ------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from itertools import permutations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -55,67 +56,43 @@ def test_as_many_pairs_as_can_be_are_made_and_the_cheapest_of_those(
 # --- who is who -------------------------------------------------------------------
 
 
-def walk_in_pairs(scene: Scene) -> None:
-    """Two people cross a picture side by side, half a metre apart, for two seconds."""
+def test_two_who_walk_side_by_side_keep_their_names() -> None:
+    scene = Scene()
     for tenth in range(20):
         scene.now = tenth / 10
         scene.look("AGI", person(3.0 + 0.1 * tenth), person(3.0 + 0.1 * tenth, 0.5))
 
-
-def test_two_who_walk_side_by_side_keep_their_names() -> None:
-    scene = Scene()
-    walk_in_pairs(scene)
-
-    assert {one.person_id: one.newest.y for one in scene.everyone} == {
-        "P1": 0.0,
-        "P2": 0.5,
-    }
+    names = {one.person_id: one.newest.y for one in scene.everyone}
+    assert names == {"P1": 0.0, "P2": 0.5}
 
 
-def follow(
-    scene: Scene, *places: tuple[float, float], seconds: float = 2.6, by: str = "AGI"
-) -> None:
-    """A robot sees people stand there for so long."""
+def follow(scene: Scene, x: float) -> None:
+    """AGI sees somebody stand there for 2.6 seconds."""
     began = scene.now
-    for tenth in range(round(seconds * 10) + 1):
+    for tenth in range(27):
         scene.now = began + tenth / 10
-        scene.look(by, *(person(x, y) for x, y in places))
+        scene.look("AGI", person(x))
 
 
-def names(scene: Scene) -> list[str]:
-    return [one.person_id for one in scene.everyone]
-
-
-def test_who_comes_back_after_a_gap_is_a_new_person_with_a_new_alert() -> None:
+@pytest.mark.parametrize(("gap_s", "name"), [(9.0, "P1"), (15.0, "P2")])
+def test_who_comes_back_after_a_gap_is_a_new_person_with_a_new_alert(
+    gap_s: float, name: str
+) -> None:
     scene = Scene()
-    follow(scene, (3.0, 0.0))
+    follow(scene, 3.0)
     first = scene.everyone[0].decision_id
-    scene.now += 15.0
+    scene.now += gap_s
 
-    scene.look("AGI", person(3.0))
-
-    assert names(scene) == ["P2"], "a mark ends where somebody is seen"
-    assert scene.everyone[0].decision_id != first
-
-
-def test_the_alert_of_somebody_who_is_followed_stays_the_same() -> None:
-    scene = Scene()
-    scene.look("AGI", person(3.0))
-    first = scene.everyone[0].decision_id
-    for tenth in range(1, 30):
-        scene.now = tenth / 10
-        scene.look("AGI", person(3.0))
-    scene.now = 12.0
     scene.look("AGI", person(3.5))
 
-    assert {one.decision_id for one in scene.everyone} == {first}
+    (somebody,) = scene.everyone
+    assert somebody.person_id == name
+    assert (somebody.decision_id == first) is (name == "P1")
 
 
 def test_numbers_begin_anew_each_day_and_ids_never_come_again() -> None:
-    tracker, midnight = (
-        Tracker(numbers=TrackNumbers("-5f0c")),
-        86400.0 - START.wall % 86400.0,
-    )
+    tracker = Tracker(numbers=TrackNumbers("-5f0c"))
+    midnight = 86400.0 - START.wall % 86400.0
     ids: list[str | None] = []
     for after, x in ((0.0, 0.0), (1.0, 50.0), (midnight - 1.0, 0.0), (midnight, 50.0)):
         now = at(after)
@@ -130,7 +107,7 @@ def test_numbers_begin_anew_each_day_and_ids_never_come_again() -> None:
 def test_a_glimpse_ends_when_its_place_was_seen_empty_and_a_name_does_not() -> None:
     scene = Scene()
     scene.look("AGI", person(3.0))
-    follow(scene, (8.0, 0.0))
+    follow(scene, 8.0)
     for one in scene.everyone:
         scene.people.drop_sighting(one.person_id, one.sightings[0])
 

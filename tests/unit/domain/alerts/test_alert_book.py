@@ -2,7 +2,9 @@
 
 from dataclasses import replace
 
-from iveg.domain.alerts import GROUPING_S, MOST_KEPT, AlertBook
+import pytest
+
+from iveg.domain.alerts import GROUPING_S, MOST_KEPT, AlertBook, BookedAlert
 from iveg.domain.events import Condition
 from tests.builders import at
 
@@ -33,34 +35,12 @@ def test_p1s_that_nobody_ever_sees_do_not_fill_the_memory() -> None:
     assert len(book.waiting) <= MOST_KEPT + 1
 
 
-def test_what_comes_back_soon_is_the_same_alert_counted() -> None:
-    book = AlertBook()
-    (first,) = book.sync([LOST], at(0), "a")
-    book.sync([], at(5), "b")
-
-    (again,) = book.sync([LOST], at(20), "c")
-
-    assert (again.alert_id, again.count, again.raised) == (first.alert_id, 2, at(0))
-
-
-def test_what_comes_back_later_is_a_new_alert() -> None:
-    book = AlertBook()
-    (first,) = book.sync([LOST], at(0), "a")
-    book.acknowledge(first.alert_id, "ana", "", at(3))
-    book.sync([], at(5), "b")
-    book.sync([], at(5.1 + GROUPING_S), "c")
-
-    (again,) = book.sync([LOST], at(5.2 + GROUPING_S), "d")
-
-    assert again.alert_id != first.alert_id
-    assert again.count == 1
-
-
-def test_acknowledging_keeps_who_when_and_note_and_hides_nothing() -> None:
+def test_the_first_acknowledgement_keeps_who_when_and_note_and_hides_nothing() -> None:
     book = AlertBook()
     (raised,) = book.sync([LOST], at(0), "a")
 
     book.acknowledge(raised.alert_id, "ana", "on my way", at(3))
+    book.acknowledge(raised.alert_id, "ben", "no, mine", at(4))
 
     (active,) = book.waiting
     assert active.last.acknowledged == at(3)
@@ -68,15 +48,19 @@ def test_acknowledging_keeps_who_when_and_note_and_hides_nothing() -> None:
     assert active.unseen is None
 
 
-def test_only_the_first_acknowledgement_counts() -> None:
+@pytest.mark.parametrize(("after_s", "count"), [(0.0, 2), (0.2, 1)])
+def test_what_comes_back_soon_is_counted_and_later_it_is_a_new_alert(
+    after_s: float, count: int
+) -> None:
     book = AlertBook()
-    (raised,) = book.sync([LOST], at(0), "a")
-    book.acknowledge(raised.alert_id, "ana", "mine", at(3))
+    (first,) = book.sync([LOST], at(0), "a")
+    book.acknowledge(first.alert_id, "ana", "", at(3))
+    book.sync([], at(5), "b")
+    book.sync([], at(4.9 + after_s + GROUPING_S), "c")
 
-    again = book.acknowledge(raised.alert_id, "ben", "no, mine", at(4))
+    (again,) = book.sync([LOST], at(5 + after_s + GROUPING_S), "d")
 
-    assert again is not None
-    assert again.last.acknowledged_by == "ana"
+    assert (again.count, again.alert_id == first.alert_id) == (count, count == 2)
 
 
 def test_what_changes_about_a_condition_is_shown_without_raising_it_again() -> None:
@@ -88,10 +72,16 @@ def test_what_changes_about_a_condition_is_shown_without_raising_it_again() -> N
     assert book.waiting[0].condition.slots == {"distance": 0.9}
 
 
-def test_13_6_a_p1_of_an_earlier_run_waits_on_and_joins_what_still_holds() -> None:
-    earlier, book = AlertBook(), AlertBook()
+def ended_before() -> BookedAlert:
+    """A P1 of an earlier run, over when that ended."""
+    earlier = AlertBook()
     earlier.sync([LOST], at(0), "a")
     (over,) = earlier.sync([], at(5), "b")
+    return over
+
+
+def test_13_6_a_p1_of_an_earlier_run_waits_on_and_joins_what_still_holds() -> None:
+    over, book = ended_before(), AlertBook()
 
     book.remember([over])
     book.sync([LOST], at(8), "c")
@@ -101,9 +91,7 @@ def test_13_6_a_p1_of_an_earlier_run_waits_on_and_joins_what_still_holds() -> No
 
 
 def test_13_6_what_is_raised_before_the_history_answers_hides_nothing_earlier() -> None:
-    earlier, book = AlertBook(), AlertBook()
-    earlier.sync([LOST], at(0), "a")
-    (over,) = earlier.sync([], at(5), "b")
+    over, book = ended_before(), AlertBook()
 
     (now,) = book.sync([LOST], at(8), "c")
     book.remember([over])

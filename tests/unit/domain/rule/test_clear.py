@@ -1,5 +1,6 @@
 """Premises of "clear": what is missing, for whom, and what of it is told."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -52,11 +53,9 @@ def test_a_healthy_fleet_lacks_nothing() -> None:
 
 @pytest.mark.parametrize("spoil", [blinded, doubted])
 def test_the_robot_and_all_in_its_cameras_reach_and_six_metres_drive_at_half(
-    spoil: object,
+    spoil: Callable[[Scene], Scene],
 ) -> None:
-    scene = fleet(REACH_M - 0.01, -REACH_M - 0.01, 60.0)
-    assert callable(spoil)
-    spoil(scene)
+    scene = spoil(fleet(REACH_M - 0.01, -REACH_M - 0.01, 60.0))
     assert factors(scene) == [0.5, 0.5, 1.0, 1.0]
 
 
@@ -97,11 +96,10 @@ def test_whose_pose_is_doubted_may_be_where_it_was_before() -> None:
 
 def test_a_detector_that_the_fleet_file_denies_is_not_waited_for() -> None:
     scene = Scene(("AGI", "R0"))
-    world = scene.world
-    agi = world.robot("AGI")
+    agi = scene.world.robot("AGI")
     agi.description = replace(agi.description, has_detector=False)
-    for name in ("AGI", "R0"):
-        scene.drive(name, 0.0 if name == "AGI" else 5.0)
+    scene.drive("AGI", 0.0)
+    scene.drive("R0", 5.0)
     scene.look("R0")
     assert factors(scene) == [1.0, 1.0]
 
@@ -129,12 +127,10 @@ def test_the_own_pose_is_told_before_a_doubt_and_a_doubt_before_a_detector() -> 
     )
 
 
-def test_what_a_recording_lacks_slows_recordings_of_its_frame_alone() -> None:
+def test_what_one_lacks_slows_no_other_between_live_robots_and_recordings() -> None:
     scene = blinded(fleet(3.0, observer="AGI:recording"))
     assert factors(scene) == [0.5, 1.0]
 
-
-def test_what_a_live_robot_lacks_slows_no_recording() -> None:
     scene = Scene(("AGI", "R0:recording"))
     scene.drive("AGI", 0.0)
     scene.drive("R0", 3.0)

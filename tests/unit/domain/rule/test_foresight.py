@@ -15,7 +15,7 @@ from iveg.domain.rule.zones import zones_of
 from tests.builders import at, origin, received
 from tests.unit.domain.scene import FIELD, Scene, person
 
-MS_10 = CM = 0.01
+MS_10 = 0.01
 
 
 class Ahead:
@@ -66,19 +66,14 @@ class Ahead:
         return found
 
 
-def test_straight_ahead_it_is_the_way_to_the_ring_by_the_speed() -> None:
-    found = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0)).see((3.6, 0.0)).must()
-    assert found.in_s == pytest.approx(1.6 / 0.8, abs=MS_10)
-    assert found.zone.cause == "P1"
-
-
-def test_a_fresh_zone_of_a_class_with_a_wider_radius_is_told_as_fresh() -> None:
+@pytest.mark.parametrize("radius", [2.0, 3.0])
+def test_straight_ahead_it_is_the_way_to_the_ring_by_the_speed(radius: float) -> None:
     ahead = Ahead(Pose2D(0, 0, 0), Twist2D(0.8, 0.0))
-    wide = ByClass(2.0, {"person": 3.0})
-    ahead.scene.rule = DetectionRule(radius_m=wide)
-    shown = ahead.see((4.6, 0.0)).must()
-    assert (shown.zone.radius_m, shown.zone.is_grown) == (3.0, False)
-    assert shown.in_s == pytest.approx(1.6 / 0.8, abs=MS_10)
+    ahead.scene.rule = DetectionRule(radius_m=ByClass(2.0, {"person": radius}))
+    found = ahead.see((1.6 + radius, 0.0)).must()
+    assert found.in_s == pytest.approx(1.6 / 0.8, abs=MS_10)
+    assert (found.zone.cause, found.zone.radius_m) == ("P1", radius)
+    assert not found.zone.is_grown
 
 
 def test_reversing_it_is_behind() -> None:
@@ -196,14 +191,12 @@ def _drive_towards(foresight: bool) -> list[tuple[float, float, float | None]]:
 
 
 def test_a_robot_is_slowed_in_time_to_be_slow_at_the_ring_and_told_how_soon() -> None:
-    first = next(one for one in _drive_towards(True) if one[1] == 0.5)
+    told = _drive_towards(True)
+    first = next(one for one in told if one[1] == 0.5)
     assert 2.5 <= first[0] <= 3.2, "the ring begins at 4.0"
     assert first[2] == pytest.approx((4.0 - first[0]) / 0.8, abs=0.2)
     assert next(one for one in _drive_towards(False) if one[1] == 0.5)[0] == 4.0
-
-
-def test_inside_the_ring_nothing_is_foretold_any_more() -> None:
-    assert {told for x, _, told in _drive_towards(True) if x >= 4.0} == {None}
+    assert {foretold for x, _, foretold in told if x >= 4.0} == {None}, "inside"
 
 
 @pytest.mark.parametrize(("braking", "speed"), [(0.5, 1.0), (0.5, 1.5), (1.0, 1.0)])

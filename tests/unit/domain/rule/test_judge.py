@@ -5,7 +5,7 @@ import pytest
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import CLEAR
 from iveg.domain.parameters import ByClass
-from tests.unit.domain.scene import HEDGE, Scene, machine, person
+from tests.unit.domain.scene import HEDGE, Scene, person
 
 RINGS = DetectionRule(foresight=False)
 """Nothing but the rings themselves counts."""
@@ -20,9 +20,9 @@ def watching(scene: Scene) -> Scene:
     return scene
 
 
-def step(scene: Scene, x: float, *, at_x: float = 0.0) -> tuple[float, str]:
-    """AGI stands at ``at_x`` and AGII sees somebody at ``x``; what AGI must do."""
-    scene.drive("AGI", at_x, linear=0.0)
+def step(scene: Scene, x: float) -> tuple[float, str]:
+    """AGI stands and AGII sees somebody at ``x``; what AGI must do."""
+    scene.drive("AGI", 0.0, linear=0.0)
     scene.drive("AGII", 50.0, linear=0.0)
     scene.look("AGI")
     scene.look("AGII", person(x))
@@ -33,10 +33,6 @@ def step(scene: Scene, x: float, *, at_x: float = 0.0) -> tuple[float, str]:
 # --- the ring ---------------------------------------------------------------------
 
 
-def test_a_robot_far_from_everybody_is_free() -> None:
-    assert watching(Scene()).judge() == {"AGI": CLEAR, "AGII": CLEAR}
-
-
 @pytest.mark.parametrize(
     ("distance", "factor"), [(0.0, 0.5), (1.999, 0.5), (2.0, 0.5), (2.0001, 1.0)]
 )
@@ -45,14 +41,10 @@ def test_f47_the_ring_is_two_metres_inclusive(distance: float, factor: float) ->
 
 
 def test_each_class_has_the_radius_that_the_rule_gives_it() -> None:
-    by_class = ByClass(2.0, {"robot": 3.0})
-    scene = watching(Scene(rule=DetectionRule(radius_m=by_class, foresight=False)))
-    scene.look("AGII", person(-2.5))
-    assert scene.judge()["AGI"] == CLEAR
-    scene.look("AGII", person(-2.0))
-    assert scene.judge()["AGI"].reason == "person"
+    wide = DetectionRule(radius_m=ByClass(2.0, {"robot": 3.0}), foresight=False)
 
-    scene = watching(Scene(rule=DetectionRule(radius_m=by_class, foresight=False)))
+    assert step(Scene(rule=wide), 2.5) == (1.0, "clear")
+    scene = watching(Scene(rule=wide))
     scene.drive("AGII", 3.0)
     assert scene.judge()["AGI"].reason == "robot"
 
@@ -78,16 +70,6 @@ def test_of_one_person_seen_at_two_places_the_nearer_counts() -> None:
 
     assert len(scene.everyone) == 1
     assert speed_limit.distance_m == pytest.approx(1.5)
-
-
-def test_the_ring_of_an_old_sighting_reaches_further() -> None:
-    scene = Scene()
-    assert step(scene, 3.0) == (1.0, "clear")
-    for _ in range(10):
-        scene.now += 0.1
-        watching(scene)
-
-    assert scene.judge()["AGI"].reason == "person"
 
 
 def test_who_does_not_see_is_slowed_and_it_is_known() -> None:
@@ -150,24 +132,7 @@ def test_a_limit_with_one_of_two_reasons_left_is_not_over() -> None:
     assert not told.over
 
 
-def test_coming_back_within_the_second_is_the_same_decision() -> None:
-    scene = Scene(rule=RINGS)
-    step(scene, 1.9)
-    leave(scene, 2.4, 0.8)
-    leave(scene, 2.1, 0.3)
-
-    assert set(leave(scene, 2.4, 0.8)) == {0.5}
-    assert len(scene.changes) == 1
-
-
 # --- several reasons --------------------------------------------------------------
-
-
-def test_f48_two_rings_are_half_speed_and_not_a_quarter() -> None:
-    scene = watching(Scene())
-    scene.look("AGI", person(1.5), person(-1.5))
-
-    assert scene.judge()["AGI"].speed_factor == 0.5
 
 
 def test_a_person_is_the_reason_that_is_told_before_a_nearer_peer() -> None:
@@ -187,13 +152,8 @@ def test_a_moving_peer_slows_who_comes_near() -> None:
     scene = watching(Scene())
     scene.drive("AGII", 1.9)
 
-    speed_limits = scene.judge()
-
-    assert {name: one.reason for name, one in speed_limits.items()} == {
-        "AGI": "robot",
-        "AGII": "robot",
-    }
-    assert speed_limits["AGI"].cause == "AGII"
+    told = [(one.reason, one.cause) for one in scene.judge().values()]
+    assert told == [("robot", "AGII"), ("robot", "AGI")]
 
 
 def test_a_standing_peer_slows_nobody() -> None:
@@ -221,13 +181,6 @@ def test_a_peer_that_falls_silent_slows_again_and_not_for_ever(
     assert scene.judge()["AGI"].reason == reason
 
 
-def test_a_robot_that_is_none_of_the_fleet_slows_like_a_person() -> None:
-    scene = watching(Scene())
-    scene.look("AGI", machine(1.5))
-
-    assert scene.judge()["AGI"].reason == "robot"
-
-
 # --- silence ----------------------------------------------------------------------
 
 
@@ -246,8 +199,6 @@ def test_a_robot_whose_pose_is_silent_for_a_second_is_slowed(
 # --- recordings -------------------------------------------------------------------
 
 RECORDED = ("AGI", "AGII:recording")
-
-
 BOTH = ("AGI:recording", "AGII:recording")
 
 
@@ -276,8 +227,7 @@ def test_a_recording_that_drives_past_slows_no_live_robot() -> None:
 
     speed_limits = scene.judge()
 
-    assert speed_limits["AGI"] == CLEAR
-    assert speed_limits["AGII"].reason == "robot"
+    assert (speed_limits["AGI"], speed_limits["AGII"].reason) == (CLEAR, "robot")
 
 
 def test_a_peer_whose_pose_goes_on_slows_others_whatever_its_twist_says() -> None:

@@ -91,25 +91,6 @@ def test_until_the_fleet_names_it_there_is_a_zone_at_both_places(
     assert min(math.dist(place[:2], PERSON) for place in zones) < 0.05
 
 
-@robots
-@pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_a_robot_within_two_metres_of_either_place_is_slowed(
-    robot_id: str, side: float
-) -> None:
-    scene = scene_of(robot_id)
-    near, far = (
-        place.position for place in scene.look(robot_id, somebody(robot_id, "map"))
-    )
-    beyond = {-1.0: near, 1.0: far}[side]
-    peer = {"AGI": "AGII", "AGII": "AGI"}[robot_id]
-    x = beyond[0] + side * 1.99 * math.cos(HERE.yaw)
-    y = beyond[1] + side * 1.99 * math.sin(HERE.yaw)
-
-    scene.drive(peer, x, y, linear=0.0)
-
-    assert scene.judge()[peer].reason == "person"
-
-
 def test_a_peer_in_a_box_without_a_frame_is_that_peer_at_both_places() -> None:
     scene = scene_of("AGI")
     scene.drive("AGII", 3.2, -3.1)
@@ -121,21 +102,13 @@ def test_a_peer_in_a_box_without_a_frame_is_that_peer_at_both_places() -> None:
     assert [one.peer for one in placed] == ["AGII", "AGII"]
 
 
-def test_a_person_in_a_frame_that_nobody_described_is_not_placed_but_counted() -> None:
-    scene = scene_of("AGI")
-
-    placed = scene.look("AGI", somebody("AGI", "map", "odom"))
-
-    assert placed == []
-    assert (scene.people.unplaced, scene.people.unknown_frames) == (
-        1,
-        frozenset({"odom"}),
-    )
-
-
-def test_somebody_seen_by_a_robot_without_a_pose_is_without_a_place() -> None:
-    scene = Scene()
-
-    scene.look("AGI", somebody("AGI", "base_link", "base_link"))
-
-    assert (scene.people.unplaced, scene.people.unknown_frames) == (1, frozenset())
+@pytest.mark.parametrize(
+    ("scene", "named", "unknown"),
+    [(scene_of("AGI"), "odom", {"odom"}), (Scene(), "base_link", set())],
+    ids=["a frame that nobody described", "by a robot without a pose"],
+)
+def test_who_cannot_be_placed_is_counted(
+    scene: Scene, named: str, unknown: set[str]
+) -> None:
+    assert scene.look("AGI", somebody("AGI", "base_link", named)) == []
+    assert (scene.people.unplaced, scene.people.unknown_frames) == (1, unknown)

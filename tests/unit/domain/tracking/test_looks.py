@@ -26,10 +26,7 @@ class Robots:
         self.suspicions = Suspicions()
 
     def look(
-        self,
-        seen: Sequence[FaintPerson],
-        moment: float,
-        robot: str = "AGI",
+        self, seen: Sequence[FaintPerson], moment: float, robot: str = "AGI"
     ) -> list[Looks]:
         found = self.suspicions.look(robot, seen, at(moment), 0.8)
         return [one for one in found if one is not None]
@@ -72,29 +69,15 @@ def test_time_without_a_look_counts_against_it() -> None:
     assert told[1] < told[0]
 
 
-def test_a_second_without_a_look_ends_a_suspicion() -> None:
-    robots = Robots()
-    robots.look([seen(0.78)], 0.0)
-    robots.look([], 1.01)
-    (looks,) = robots.look([seen(0.6)], 1.1)
-
-    assert looks.count == 1
-
-
 def test_who_walks_on_is_the_same_and_who_stands_elsewhere_another() -> None:
     robots = Robots()
     robots.look([seen(x=5.0)], 0.0)
+    (other_robots,) = robots.look([seen()], 0.1, "AGII")
     walked, other = robots.look([seen(x=5.5), seen(x=9.0)], LOOK_S)
+    robots.look([], LOOK_S + 1.01)
+    (later,) = robots.look([seen(x=5.5)], LOOK_S + 1.1)
 
-    assert (walked.count, other.count) == (2, 1)
-
-
-def test_looks_of_other_robots_do_not_count() -> None:
-    robots = Robots()
-    robots.look([seen()], 0.0)
-    (looks,) = robots.look([seen()], 0.1, "AGII")
-
-    assert looks.count == 1
+    assert [one.count for one in (walked, other, other_robots, later)] == [2, 1, 1, 1]
 
 
 @pytest.mark.parametrize(

@@ -6,14 +6,7 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.observations import Detection
-from tests.builders import (
-    at,
-    detection,
-    detection_frame,
-    odometry,
-    origin,
-    received,
-)
+from tests.builders import at, detection, detection_frame, odometry, origin, received
 from tests.unit.domain.scene import Scene, machine, person
 
 # --- where ------------------------------------------------------------------------
@@ -49,14 +42,15 @@ def test_a_faint_farmer_or_another_object_is_shown_and_is_nobody(
     assert scene.everyone == []
 
 
-def test_someone_more_than_two_metres_away_is_someone_else() -> None:
+def test_who_is_two_metres_away_or_a_robot_is_somebody_else() -> None:
     scene = Scene()
-    scene.look("AGI", person(3.0))
+    scene.look("AGI", person(3.0), machine(3.0, 0.1))
+    assert [one.person_id for one in scene.everyone] == ["P1", "R2"]
     scene.now = 1.0
 
     scene.look("AGI", person(5.01))
 
-    assert len(scene.everyone) == 2
+    assert len(scene.everyone) == 3
 
 
 def test_one_person_seen_by_two_robots_has_two_observers() -> None:
@@ -69,13 +63,6 @@ def test_one_person_seen_by_two_robots_has_two_observers() -> None:
     (known,) = scene.everyone
     assert set(known.observers(at(0.1))) == {"AGI", "AGII"}
     assert known.newest.observer == "AGII"
-
-
-def test_a_robot_is_never_the_same_as_a_person() -> None:
-    scene = Scene()
-    scene.look("AGI", person(3.0), machine(3.0, 0.1))
-
-    assert [one.person_id for one in scene.everyone] == ["P1", "R2"]
 
 
 def test_a_look_older_than_the_newest_of_its_robot_changes_nothing() -> None:
@@ -93,23 +80,26 @@ def test_a_look_older_than_the_newest_of_its_robot_changes_nothing() -> None:
 # --- peers ------------------------------------------------------------------------
 
 
-def test_a_robot_seen_where_a_peer_stands_is_that_peer_and_no_second_robot() -> None:
-    scene = Scene()
-    scene.drive("AGII", 5.0)
+@pytest.mark.parametrize(
+    ("robots", "driven", "seen_at", "peer"),
+    [
+        (("AGI", "AGII"), "AGII", 5.8, "AGII"),
+        (("AGI", "AG3"), "AG3", 6.2, None),
+        (("AGI", "AGII:recording"), "AGII", 5.0, None),
+        (("AGI", "AGII"), "AGI", 5.0, None),
+    ],
+    ids=["described", "of unknown size", "a recording", "itself"],
+)
+def test_a_robot_seen_where_a_peer_stands_is_that_peer_and_no_second_robot(
+    robots: tuple[str, ...], driven: str, seen_at: float, peer: str | None
+) -> None:
+    scene = Scene(robots=robots)
+    scene.drive(driven, 5.0)
 
-    (placed,) = scene.look("AGI", machine(5.8))
+    (placed,) = scene.look("AGI", machine(seen_at))
 
-    assert placed.peer == "AGII"
-    assert scene.everyone == []
-
-
-def test_of_a_peer_of_unknown_size_one_sighting_more_is_kept() -> None:
-    scene = Scene(robots=("AGI", "AG3"))
-    scene.drive("AG3", 5.0)
-
-    (placed,) = scene.look("AGI", machine(6.2))
-
-    assert placed.peer is None
+    assert placed.peer == peer
+    assert len(scene.everyone) == (peer is None)
 
 
 @pytest.mark.parametrize("lie", ["drives on", "silent", "doubted"])
@@ -128,24 +118,6 @@ def test_no_robots_word_alone_takes_the_ring_of_what_another_sees_away(
 
     assert placed.peer is None
     assert [one.class_ for one in scene.everyone] == ["robot"]
-
-
-def test_a_recording_is_no_peer_of_a_robot_that_is_seen_today() -> None:
-    scene = Scene(robots=("AGI", "AGII:recording"))
-    scene.drive("AGII", 5.0)
-
-    (placed,) = scene.look("AGI", machine(5.0))
-
-    assert placed.peer is None
-
-
-def test_a_robot_is_not_told_of_itself() -> None:
-    scene = Scene()
-    scene.drive("AGI", 5.0)
-
-    (placed,) = scene.look("AGI", machine(5.0))
-
-    assert placed.peer is None
 
 
 # --- ages -------------------------------------------------------------------------
