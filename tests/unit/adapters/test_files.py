@@ -17,24 +17,33 @@ from tests.fakes.disk import files_no_longer_than
 FORM = Form("notes", 2)
 
 
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "notes"
+
+
+def lines_of(path: Path) -> list[bytes]:
+    return [line for _, line in read_lines(path, FORM)]
+
+
 def test_a_file_is_its_owners_alone_and_nothing_is_left_beside_it(
-    tmp_path: Path,
+    path: Path,
 ) -> None:
-    write_lines(tmp_path / "notes", FORM, [])
-    write_lines(tmp_path / "notes", FORM, [])
+    write_lines(path, FORM, [])
+    write_lines(path, FORM, [])
 
-    assert [one.name for one in tmp_path.iterdir()] == ["notes"]
-    assert (tmp_path / "notes").stat().st_mode & 0o777 == 0o600
+    assert [one.name for one in path.parent.iterdir()] == ["notes"]
+    assert path.stat().st_mode & 0o777 == 0o600
 
 
-def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path) -> None:
-    write_lines(tmp_path / "notes", FORM, ["old"])
-    (tmp_path / "notes.new").mkdir()
+def test_a_write_that_fails_leaves_the_old_file(path: Path) -> None:
+    write_lines(path, FORM, ["old"])
+    path.with_suffix(".new").mkdir()
 
     with pytest.raises(OSError, match="notes"):
-        write_lines(tmp_path / "notes", FORM, ["new"])
+        write_lines(path, FORM, ["new"])
 
-    assert list(read_lines(tmp_path / "notes", FORM)) == [(2, b'"old"')]
+    assert lines_of(path) == [b'"old"']
 
 
 @pytest.mark.parametrize(
@@ -45,71 +54,56 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path) -> None:
     ],
 )
 def test_a_file_of_a_newer_iveg_or_another_kind_is_not_guessed_at(
-    tmp_path: Path, other: Form, says: str
+    path: Path, other: Form, says: str
 ) -> None:
-    write_lines(tmp_path / "notes", other, ["x"])
+    write_lines(path, other, ["x"])
 
     with pytest.raises(DataFileError, match=says):
-        list(read_lines(tmp_path / "notes", FORM))
+        list(read_lines(path, FORM))
 
 
 def test_a_line_after_a_torn_one_stands_by_itself(tmp_path: Path) -> None:
-    notes = ReservedFile(tmp_path / "deep" / "notes", FORM)
+    path = tmp_path / "deep" / "notes"
+    notes = ReservedFile(path, FORM)
     notes.append(b'"first"\n')
     notes.close()
-    with (tmp_path / "deep" / "notes").open("ab") as file:
+    with path.open("ab") as file:
         file.write(b'"cut sh')
 
     notes.append(b'"second"\n')
     notes.close()
 
-    lines = [line for _, line in read_lines(tmp_path / "deep" / "notes", FORM)]
-    assert lines == [b'"first"', b'"cut sh', b'"second"']
+    assert lines_of(path) == [b'"first"', b'"cut sh', b'"second"']
 
 
-def test_room_for_a_megabyte_more_is_taken_from_the_disk_ahead(tmp_path: Path) -> None:
-    notes = ReservedFile(tmp_path / "notes", FORM)
+def test_room_for_a_megabyte_more_is_taken_from_the_disk_ahead(path: Path) -> None:
+    notes = ReservedFile(path, FORM)
 
     notes.append(b'"first"\n')
 
-    taken = (tmp_path / "notes").stat()
+    taken = path.stat()
     assert taken.st_size - notes.size >= RESERVE_BYTES
     assert taken.st_blocks * 512 >= RESERVE_BYTES
-    assert [line for _, line in read_lines(tmp_path / "notes", FORM)] == [b'"first"']
+    assert lines_of(path) == [b'"first"']
     notes.close()
-    assert (tmp_path / "notes").stat().st_size == notes.size
+    assert path.stat().st_size == notes.size
 
 
-def test_a_full_disk_takes_lines_within_the_reserve(tmp_path: Path) -> None:
-    notes = ReservedFile(tmp_path / "notes", FORM)
-    notes.open()
-    size = (tmp_path / "notes").stat().st_size
-
-    # As on a full disk no file grows: not by a byte.
-    with files_no_longer_than(size):
-        for _ in range(10):
-            notes.append(b"1" * 100_000 + b"\n")
-    notes.close()
-
-    assert len(list(read_lines(tmp_path / "notes", FORM))) == 10
-
-
-def test_lines_that_the_disk_did_not_take_are_in_no_part_there(tmp_path: Path) -> None:
-    notes = ReservedFile(tmp_path / "notes", FORM)
+def test_lines_that_the_disk_did_not_take_are_in_no_part_there(path: Path) -> None:
+    notes = ReservedFile(path, FORM)
     notes.append(b'"first"\n')
-    size = (tmp_path / "notes").stat().st_size
+    size = path.stat().st_size
 
     with files_no_longer_than(size), pytest.raises(OSError, match=r"written|large"):
         notes.append(b"1\n" * size)
 
     notes.append(b'"second"\n')
     notes.close()
-    lines = [line for _, line in read_lines(tmp_path / "notes", FORM)]
-    assert lines == [b'"first"', b'"second"']
+    assert lines_of(path) == [b'"first"', b'"second"']
 
 
-def test_a_file_that_cannot_be_rewritten_stands(tmp_path: Path) -> None:
-    notes = ReservedFile(tmp_path / "notes", FORM)
+def test_a_file_that_cannot_be_rewritten_stands(path: Path) -> None:
+    notes = ReservedFile(path, FORM)
     notes.append(b'"first"\n')
 
     with files_no_longer_than(RESERVE_BYTES), pytest.raises(OSError, match="large"):
@@ -117,6 +111,5 @@ def test_a_file_that_cannot_be_rewritten_stands(tmp_path: Path) -> None:
 
     notes.append(b'"second"\n')
     notes.close()
-    lines = [line for _, line in read_lines(tmp_path / "notes", FORM)]
-    assert lines == [b'"first"', b'"second"']
-    assert [one.name for one in tmp_path.iterdir()] == ["notes"]
+    assert lines_of(path) == [b'"first"', b'"second"']
+    assert [one.name for one in path.parent.iterdir()] == ["notes"]

@@ -1,14 +1,11 @@
 import asyncio
 import contextlib
-import logging
 import os
 import sqlite3
-import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
-import pytest
 from sqlalchemy import text
 
 from iveg.adapters import clock
@@ -29,6 +26,7 @@ from tests.fakes.records import (
     log_record,
     odometry_record,
 )
+from tests.patience import PATIENCE_S, until
 
 EVERYTHING = (
     alert_record(),
@@ -40,8 +38,6 @@ EVERYTHING = (
     log_record(),
     odometry_record(),
 )
-ORDERS = 2
-_PATIENCE_S = 30.0
 
 
 @asynccontextmanager
@@ -62,13 +58,6 @@ async def recording(
         journal.close()
 
 
-async def until(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + _PATIENCE_S
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come true"
-        await asyncio.sleep(0.02)
-
-
 def state(recorder: Recorder) -> str:
     return recorder.state(clock.now())
 
@@ -81,25 +70,36 @@ def scalar(database_url: str, query: str) -> object:
     return found
 
 
+TABLES = (
+    "alerts",
+    "audit",
+    "command_events",
+    "commands",
+    "decisions",
+    "detections",
+    "log",
+    "odometry",
+)
+
+
+def count(database_url: str, table: str) -> object:
+    return scalar(database_url, f"SELECT count(*) FROM {table}")  # noqa: S608
+
+
 def counts(database_url: str) -> dict[str, object]:
-    tables = (
-        "alerts",
-        "audit",
-        "command_events",
-        "commands",
-        "decisions",
-        "detections",
-        "log",
-        "odometry",
-    )
-    return {
-        table: scalar(database_url, f"SELECT count(*) FROM {table}")  # noqa: S608
-        for table in tables
-    }
+    return {table: count(database_url, table) for table in TABLES}
 
 
 def moved_aside(directory: Path) -> list[Path]:
     return list(directory.glob("history.db.corrupt-*"))
+
+
+def left(directory: Path) -> list[Record]:
+    """Rows that the journal keeps for the next run."""
+    journal = FileJournal(directory / "commands.jsonl")
+    journal.read()
+    journal.close()
+    return [one.record for one in journal.left()]
 
 
 def lock(database_url: str) -> sqlite3.Connection:
@@ -123,9 +123,8 @@ async def test_everything_that_is_offered_is_stored(
 
 
 async def test_while_the_database_is_locked_only_the_oldest_telemetry_is_lost(
-    sqlite_url: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+    sqlite_url: str, tmp_path: Path
 ) -> None:
-    caplog.set_level(logging.INFO, "iveg.adapters.history.recorder")
     upgrade(sqlite_url)
     other = lock(sqlite_url)
     url = f"{sqlite_url}?timeout=0.2"
@@ -147,7 +146,6 @@ async def test_while_the_database_is_locked_only_the_oldest_telemetry_is_lost(
     assert set(stored.values()) == {1}
     assert recorder.counters["history_dropped"] == 98
     assert moved_aside(tmp_path) == []
-    assert [record.levelname for record in caplog.records] == ["WARNING", "INFO"]
 
 
 async def test_a_server_that_dies_is_missed_and_welcomed_back(
@@ -166,7 +164,7 @@ async def test_a_server_that_dies_is_missed_and_welcomed_back(
         await until(lambda: recorder.counters["history_waiting"] == 0)
 
     assert scalar(postgresql_url, "SELECT state FROM commands") == "STANDING"
-    assert scalar(postgresql_url, "SELECT count(*) FROM odometry") == 1
+    assert count(postgresql_url, "odometry") == 1
 
 
 async def crash(database_url: str, path: Path, *records: Record) -> None:
@@ -182,13 +180,11 @@ async def test_what_a_crash_left_in_the_journal_is_stored_at_the_next_start(
 ) -> None:
     await crash(database_url, tmp_path / "commands.jsonl", command_record(state="SENT"))
     upgrade(database_url)
-    assert scalar(database_url, "SELECT count(*) FROM commands") == 0
+    assert count(database_url, "commands") == 0
 
     async with recording(database_url, tmp_path) as recorder:
-        await asyncio.wait_for(recorder.caught_up(), _PATIENCE_S)
-        stored = scalar(database_url, "SELECT state FROM commands")
-
-    assert stored == "SENT"
+        await asyncio.wait_for(recorder.caught_up(), PATIENCE_S)
+        assert scalar(database_url, "SELECT state FROM commands") == "SENT"
 
 
 async def test_a_journal_that_comes_back_overwrites_nothing_and_doubles_nothing(
@@ -203,10 +199,10 @@ async def test_a_journal_that_comes_back_overwrites_nothing_and_doubles_nothing(
     path.write_bytes(old)
 
     async with recording(database_url, tmp_path) as recorder:
-        await asyncio.wait_for(recorder.caught_up(), _PATIENCE_S)
+        await asyncio.wait_for(recorder.caught_up(), PATIENCE_S)
 
     assert scalar(database_url, "SELECT state FROM commands") == "STANDING"
-    assert scalar(database_url, "SELECT count(*) FROM command_events") == 1
+    assert count(database_url, "command_events") == 1
 
 
 async def test_the_journal_lets_go_of_what_the_database_has(
@@ -238,12 +234,9 @@ async def test_closing_while_the_database_is_away_leaves_orders_to_the_journal(
     journal.close()
     other.close()
 
-    later = FileJournal(tmp_path / "commands.jsonl")
-    later.read()
-    left = [one.record for one in later.left()]
-    assert left == [command_event_record(), command_record()]
-    assert recorder.counters["history_dropped"] == len(EVERYTHING) - ORDERS
-    later.close()
+    orders = [command_event_record(), command_record()]
+    assert left(tmp_path) == orders
+    assert recorder.counters["history_dropped"] == len(EVERYTHING) - len(orders)
 
 
 async def test_a_bad_row_holds_up_no_rows_of_other_kinds(
@@ -258,8 +251,8 @@ async def test_a_bad_row_holds_up_no_rows_of_other_kinds(
         await until(lambda: state(recorder) == "ok")
 
     assert recorder.counters["history_rejected"] == 3
-    assert scalar(database_url, "SELECT count(*) FROM odometry") == 0
-    assert scalar(database_url, "SELECT count(*) FROM commands") == 1
+    assert count(database_url, "odometry") == 0
+    assert count(database_url, "commands") == 1
 
 
 async def test_a_file_that_rots_while_in_use_is_moved_aside(
@@ -309,4 +302,4 @@ async def test_what_the_disk_did_not_take_waits_for_the_database(
 
     (tmp_path / "journal").rmdir()
     await recorder.close()
-    assert scalar(sqlite_url, "SELECT count(*) FROM commands") == 1
+    assert count(sqlite_url, "commands") == 1

@@ -14,6 +14,7 @@ from iveg.domain.errors import DataFileError
 from iveg.domain.events import Address, AlertItem, MessagePlan, MessageText
 from iveg.web.pages.sentences import writer
 from tests.builders import START
+from tests.http_servers import Request, Response, http_server
 
 TEXT = MessageText("iVeg: P1", "Open iVeg.")
 WHOLE = """\
@@ -34,59 +35,44 @@ class Stand:
 
     def __init__(self, status: int = 200) -> None:
         self.status, self.bodies, self.port = status, list[bytes](), 0
-        self.held = asyncio.Event()
-        self.held.set()
-        self.came = asyncio.Event()
+        self.is_open, self.came = asyncio.Event(), asyncio.Event()
+        self.is_open.set()
 
-    async def serve(
-        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
-    ) -> None:
-        head = (await reader.readuntil(b"\r\n\r\n")).lower()
-        length = int(head.partition(b"content-length:")[2].split()[0])
-        self.bodies.append(await reader.readexactly(length))
+    async def answer(self, request: Request) -> Response:
+        self.bodies.append(request.body)
         self.came.set()
-        await self.held.wait()
-        answer = f"HTTP/1.1 {self.status} X\r\nContent-Length: 0\r\n"
-        writer.write(f"{answer}Connection: close\r\n\r\n".encode())
-        await writer.drain()
-        writer.close()
-        await writer.wait_closed()
+        await self.is_open.wait()
+        return Response(self.status)
 
     def address(self) -> Address:
         return Address("Ana", f"json://user:tomato@127.0.0.1:{self.port}/secret")
 
 
 @contextlib.asynccontextmanager
-async def standing(stand: Stand) -> AsyncIterator[Stand]:
-    server = await asyncio.start_server(stand.serve, "127.0.0.1", 0)
-    stand.port = server.sockets[0].getsockname()[1]
-    async with server:
+async def standing(status: int = 200) -> AsyncIterator[Stand]:
+    stand = Stand(status)
+    async with http_server(stand.answer, "127.0.0.1", 0) as stand.port:
         yield stand
 
 
-async def test_a_message_arrives_by_apprise() -> None:
-    async with standing(Stand()) as stand:
-        assert await AppriseSender().send(stand.address(), TEXT) is None
-
-    (body,) = [orjson.loads(one) for one in stand.bodies]
-    assert (body["title"], body["message"]) == (TEXT.title, TEXT.body)
-
-
-async def test_the_loop_goes_on_while_an_address_does_not_answer() -> None:
-    async with standing(Stand()) as stand:
-        stand.held.clear()
+async def test_a_message_arrives_and_the_loop_goes_on_until_it_is_answered() -> None:
+    async with standing() as stand:
+        stand.is_open.clear()
         sending = asyncio.create_task(AppriseSender().send(stand.address(), TEXT))
         await stand.came.wait()
         assert not sending.done()
-        stand.held.set()
+        stand.is_open.set()
         assert await sending is None
+
+    (body,) = [orjson.loads(one) for one in stand.bodies]
+    assert (body["title"], body["message"]) == (TEXT.title, TEXT.body)
 
 
 async def test_a_refusal_is_said_and_no_secret_logged(
     caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
 ) -> None:
     caplog.set_level(logging.DEBUG)
-    async with standing(Stand(500)) as stand:
+    async with standing(500) as stand:
         assert await AppriseSender().send(stand.address(), TEXT) == "not taken"
     assert await AppriseSender().send(stand.address(), TEXT) == "not taken"
 
@@ -112,11 +98,7 @@ def test_a_file_names_addresses_and_those_of_an_escalation(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("right", "wrong", "said"),
     [
-        (
-            "json://user",
-            "nothing://user",
-            "address[0].url: is not one of apprise.",
-        ),
+        ("json://user", "nothing://user", "address[0].url: is not one of apprise."),
         ('"P2"', '"P4"', "address[0].least"),
         ("escalate_after_min = 5", "escalate_after_min = 0", "escalate_after_min"),
         ('name = "Guard"\n', "", "escalation[0].name"),
@@ -124,11 +106,7 @@ def test_a_file_names_addresses_and_those_of_an_escalation(tmp_path: Path) -> No
     ],
 )
 def test_a_file_that_cannot_be_used_is_refused_without_its_secrets(
-    tmp_path: Path,
-    caplog: pytest.LogCaptureFixture,
-    right: str,
-    wrong: str,
-    said: str,
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, right: str, wrong: str, said: str
 ) -> None:
     file = tmp_path / "messages.toml"
     file.write_text(WHOLE.replace(right, wrong))

@@ -181,13 +181,3 @@ async def test_an_update_is_one_request_for_each_subscription_that_is_about_it(
         if "timesSent" in one["notification"]
     }
     assert sent == dict.fromkeys([*told, "climate"], 1)
-
-
-async def test_the_secret_of_an_earlier_start_is_known_until_it_is_replaced() -> None:
-    store = FakeStore()
-    first = await ensure_subscriptions(store, URL, "cd" * 32, WANTED)
-    second = await ensure_subscriptions(store, URL, TOKEN, WANTED)
-    third = await ensure_subscriptions(store, URL, TOKEN, WANTED)
-
-    found = [set(one.former_secrets) for one in (first, second, third)]
-    assert found == [set(), {"cd" * 32}, set()]
