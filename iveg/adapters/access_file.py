@@ -1,7 +1,7 @@
 """File of accounts, tokens and sessions, which memory writes and a start reads.
 
-JSON lines, a record and its checksum in each, replaced as a whole beside the requests:
-a disk that is slow, full or gone holds up no sign-in and no STOP.  A file that another
+JSON lines, a record in each, replaced as a whole beside the requests: a disk that is
+slow, full or gone holds up no sign-in and no STOP.  A file that another
 program changed while iVeg ran is put aside and written anew from memory; of a file that
 was damaged before the start every whole line is read.  No token is in it, only SHA-256.
 
@@ -11,7 +11,6 @@ was damaged before the start every whole line is read.  No token is in it, only 
 import asyncio
 import logging
 import os
-import zlib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -100,7 +99,7 @@ class AccessFile:
         is_whole = head + b"\n" == FORM.line
         for number, line in enumerate(lines, 2):
             try:
-                kind, row = _checked(line)
+                kind, row = _row(line)
                 found[kind].append(row)
             except ValueError:
                 _log.warning("%s, line %d: not readable", self._path, number)
@@ -186,7 +185,7 @@ class AccessFile:
             HopError: the disk did not take it.
         """
         left = _LeftChange(change.action, change.row, change.details, change.gone)
-        line = orjson.dumps(_with_checksum("change", left))
+        line = orjson.dumps({"change": left})
         try:
             write_bytes(self.beside(f"{self._path.name}.left-{new_id()}"), line)
         except OSError as error:
@@ -199,7 +198,7 @@ class AccessFile:
             if path.suffix.endswith((".new", ".unreadable")):
                 continue
             try:
-                _, left = _checked(path.read_bytes())
+                _, left = _row(path.read_bytes())
                 change = AccessChange(
                     CONSOLE, left.action, left.row, left.details, left.gone
                 )
@@ -240,29 +239,25 @@ def earlier_sessions(path: Path) -> tuple[Session, ...]:
 
 
 def _lines(access: Access, copied: bool) -> list[Json]:
-    rows: list[tuple[str, object]] = [
-        *(("account", row) for row in access.accounts),
-        *(("token", row) for row in access.tokens),
-        *(("session", row) for row in access.sessions),
+    rows: list[Json] = [
+        *({"account": row} for row in access.accounts),
+        *({"token": row} for row in access.tokens),
+        *({"session": row} for row in access.sessions),
     ]
-    return [_with_checksum(*row) for row in (*rows, ("end", (len(rows), copied)))]
+    return [*rows, {"end": (len(rows), copied)}]
 
 
-def _with_checksum(kind: str, row: object) -> Json:
-    written = orjson.dumps(row)
-    return {kind: orjson.Fragment(written), "crc": zlib.crc32(written)}
+def _row(line: bytes) -> tuple[str, Any]:
+    """Kind and row of a line; the checksum of earlier versions is left out.
 
-
-def _checked(line: bytes) -> tuple[str, Any]:
-    """Kind and row of a line. Raises ValueError: it is not as it was written."""
+    Raises:
+        ValueError: it is no record.
+    """
     entry = orjson.loads(line)
-    if not isinstance(entry, dict) or len(entry) != 2 or "crc" not in entry:
+    kind = next(iter(entry), "") if isinstance(entry, dict) else ""
+    if kind not in _READ:
         raise ValueError("no record")
-    kind = next(iter(entry))
-    written = orjson.dumps(entry[kind])
-    if kind not in _READ or zlib.crc32(written) != entry["crc"]:
-        raise ValueError("another checksum")
-    row = _READ[kind].validate_json(written, strict=True)
+    row = _READ[kind].validate_json(orjson.dumps(entry[kind]), strict=True)
     if isinstance(row, Session):
         bytes.fromhex(row.digest)  # nobody finds a session by another digest
     return kind, row

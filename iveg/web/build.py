@@ -141,9 +141,8 @@ def build_app(
     app.add_middleware(
         audited.AuditRequests, identify=identify, trail=web.trail, clock=clock
     )
-    app.add_middleware(headers.BodyLimit)
     app.add_middleware(rate_limits.SocketLimits, identify=identify, clock=clock)
     app.add_middleware(rate_limits.SignInGate, clock=clock)
     # Last is outermost: a refusal carries the headers, too.
-    app.add_middleware(headers.SecurityHeaders)
+    app.add_middleware(headers.Bounds)
     return app

@@ -125,11 +125,11 @@ def test_what_is_whole_in_a_damaged_file_is_in_after_a_restart_with_a_dead_datab
     path = place.directory / "accounts.jsonl"
     until(lambda: path.read_bytes().count(b'"session"') == 4, "all are on disk")
     place.programs[-1].kill()
-    # In the middle of the file stands a session of nobody else.
+    # In the middle of the file stands a line that is no record.
     lines = path.read_bytes().splitlines(keepends=True)
     sessions = [n for n, one in enumerate(lines) if b'"session"' in one]
     (of_eva,) = (n for n in sessions if b"Eva" in lines[n])
-    lines[of_eva] = lines[of_eva].replace(b"Eva", b"Ada")
+    lines[of_eva] = lines[of_eva].replace(b"Eva", b"E\xa5a")
     path.write_bytes(b"".join(lines[:-1]))
     _overwrite(place.directory / "history.sqlite")
 

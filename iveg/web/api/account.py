@@ -45,7 +45,6 @@ from iveg.web.security.requirements import (
     Admin,
     Reader,
     authenticator_of,
-    refusals,
     require,
 )
 from iveg.web.security.roles import Action, Principal, Role
@@ -111,9 +110,7 @@ class PasswordBody(Body):
 
 def router(people: People) -> APIRouter:
     """The routes of whoever asks, about themselves."""
-    routes = APIRouter(
-        prefix="/api/v1/account", tags=["account"], responses=refusals(409, 429)
-    )
+    routes = APIRouter(prefix="/api/v1/account", tags=["account"])
 
     @routes.get("", response_model=OwnAccount)
     async def own(who: Reader) -> Response:
@@ -209,7 +206,6 @@ def users_router(people: People) -> APIRouter:
         prefix="/api/v1/users",
         tags=["users"],
         dependencies=ADMINS,
-        responses=refusals(409),
     )
 
     @routes.get("", response_model=Listing[UserAccount])
@@ -279,7 +275,7 @@ class TokenBody(_Newcomer):
 
 def tokens_router(people: People) -> APIRouter:
     """The routes of tokens; all for admins."""
-    routes = APIRouter(prefix="/api/v1/tokens", tags=["users"], responses=refusals(409))
+    routes = APIRouter(prefix="/api/v1/tokens", tags=["users"])
 
     @routes.get(
         "",

@@ -22,7 +22,7 @@ from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Moment, Span, seconds
 from iveg.web.pages.sentences import local_stamp
-from iveg.web.security.requirements import READERS, Operator, refusals
+from iveg.web.security.requirements import READERS, Operator
 
 MOST_TOGETHER = 200
 """More alerts at once nobody has read."""
@@ -121,7 +121,7 @@ def notes_router(
         log: Takes the lines.
         clock: What a note without a time is about.
     """
-    routes = APIRouter(prefix="/api/v1", tags=["history"], responses=refusals(503))
+    routes = APIRouter(prefix="/api/v1", tags=["history"])
 
     @routes.get(
         "/notes",

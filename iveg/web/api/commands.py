@@ -14,7 +14,7 @@ from iveg.vital.command import Commander
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.presses import DESCRIBED, press_of
-from iveg.web.security.requirements import Operator, Presser, refusals
+from iveg.web.security.requirements import Operator, Presser
 
 HoldId = Annotated[str, Field(min_length=1, max_length=64)]
 
@@ -61,7 +61,6 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
         "/robots/{robot_id}/release",
         status_code=202,
         response_model=Pressed,
-        responses=refusals(409),
     )
     async def release(robot_id: str, body: ReleaseRequest, who: Operator) -> Response:
         """Lift exactly the holds that the person saw; 409 when they have changed."""
@@ -72,7 +71,6 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
         "/robots/{robot_id}/resume",
         status_code=202,
         response_model=Pressed,
-        responses=refusals(409),
     )
     async def resume(robot_id: str, who: Operator) -> Response:
         """Let a released robot drive again."""

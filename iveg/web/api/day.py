@@ -50,7 +50,7 @@ from iveg.web.api.history_filters import HistoryDay, Range, Span, range_of
 from iveg.web.pages import charts
 from iveg.web.pages.drawing import Pages
 from iveg.web.pages.sentences import in_madrid, start_of
-from iveg.web.security.requirements import refusals, require
+from iveg.web.security.requirements import require
 
 _DAY_S = 86_400.0
 _FIGURES: dict[str, Any] = {
@@ -147,7 +147,6 @@ def stop_records_router(
         prefix="/api/v1",
         tags=["commands"],
         dependencies=[Depends(require("read"))],
-        responses=refusals(503),
     )
 
     @routes.get("/commands/{command_id}", response_model=Command)
@@ -261,7 +260,6 @@ def router(read: ReadDay, pages: Pages, clock: Clock) -> APIRouter:
         response_model=Day,
         dependencies=[who],
         tags=["history"],
-        responses=refusals(503),
     )
     async def numbers(
         day: Annotated[

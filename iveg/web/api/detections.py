@@ -25,7 +25,7 @@ from iveg.web.api.answers import FEW_ROWS, Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
 from iveg.web.api.history_filters import RowFilters, admitting
 from iveg.web.pages.sentences import in_madrid, start_of
-from iveg.web.security.requirements import READERS, Operator, refusals
+from iveg.web.security.requirements import READERS, Operator
 
 
 def router(newest: NewestDetections, worker: Apart) -> APIRouter:
@@ -34,7 +34,6 @@ def router(newest: NewestDetections, worker: Apart) -> APIRouter:
         prefix="/api/v1",
         tags=["live"],
         dependencies=READERS,
-        responses=refusals(503),
     )
 
     @routes.get(
@@ -117,7 +116,6 @@ def words_router(detectors: Detectors, marks: ThingMarks, clock: Clock) -> APIRo
     @routes.put(
         "/robots/{robot_id}/detector",
         response_model=Detector,
-        responses=refusals(503),
         tags=["robots"],
     )
     async def service(
@@ -141,9 +139,7 @@ def words_router(detectors: Detectors, marks: ThingMarks, clock: Clock) -> APIRo
         )
         return Json(Detector.of(robot, now))
 
-    @routes.put(
-        "/words", status_code=204, responses=refusals(404, 503), tags=["people"]
-    )
+    @routes.put("/words", status_code=204, tags=["people"])
     async def answer(body: WordRequest, who: Operator) -> Response:
         """Say whether a word that was asked for stands for a person."""
         now = clock()
@@ -162,7 +158,6 @@ def words_router(detectors: Detectors, marks: ThingMarks, clock: Clock) -> APIRo
         "/things",
         status_code=201,
         response_model=Thing,
-        responses=refusals(404, 409),
         tags=["people"],
     )
     async def mark(body: MarkRequest, who: Operator) -> Response:

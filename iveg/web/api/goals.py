@@ -10,7 +10,7 @@ from iveg.domain.goals import GoalWish
 from iveg.models.robot import Goal
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.security.requirements import Operator, refusals
+from iveg.web.security.requirements import Operator
 
 _Metres = Annotated[float, Field(ge=-1e6, le=1e6)]
 
@@ -47,7 +47,7 @@ GoalRequest = Annotated[
 
 def router(goals: GoalDispatcher, clock: Clock) -> APIRouter:
     """Goals of robots."""
-    routes = APIRouter(prefix="/api/v1", tags=["commands"], responses=refusals(409))
+    routes = APIRouter(prefix="/api/v1", tags=["commands"])
 
     @routes.post("/robots/{robot_id}/goal", status_code=202, response_model=Goal)
     async def give(robot_id: str, body: GoalRequest, who: Operator) -> Response:

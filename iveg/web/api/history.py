@@ -37,7 +37,7 @@ from iveg.web.api.answers import Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
 from iveg.web.api.history_filters import Filters, filter_of
 from iveg.web.pages.sentences import Sentences, read_sentences
-from iveg.web.security.requirements import refusals, require
+from iveg.web.security.requirements import require
 from iveg.web.security.roles import Action
 
 R = TypeVar("R", bound=Record)
@@ -165,7 +165,6 @@ def router(
     routes = APIRouter(
         dependencies=[Depends(require("read"))],
         tags=["history"],
-        responses=refusals(503),
     )
     for one in lists_of(queries, alerts):
         _add_list(routes, queries, one, worker)
@@ -195,7 +194,7 @@ def _add_list(
         name=one.path,
         summary=one.says,
         response_model=Listing[one.shape],  # type: ignore[name-defined]
-        responses={200: {"content": _FILES}, **refusals(501)},
+        responses={200: {"content": _FILES}},
         dependencies=[Depends(require(one.needs))],
     )
     async def listing(

@@ -33,7 +33,7 @@ from iveg.models.health import (
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Apart, Json
 from iveg.web.pages.charts import cdf_figure
-from iveg.web.security.requirements import READERS, refusals
+from iveg.web.security.requirements import READERS
 
 
 class Asked(BaseModel):
@@ -73,7 +73,6 @@ def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
         prefix="/api/v1",
         tags=["latency"],
         dependencies=READERS,
-        responses=refusals(503),
     )
 
     @routes.get("/latency", response_model=LatencyTable)

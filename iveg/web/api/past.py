@@ -13,7 +13,7 @@ from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Moment
 from iveg.web.live.pictures import Past
-from iveg.web.security.requirements import READERS, refusals
+from iveg.web.security.requirements import READERS
 
 MEDIA_TYPE = "application/vnd.mcap"
 
@@ -24,7 +24,6 @@ def router(recordings: InputRecorder, past: Past, clock: Clock) -> APIRouter:
         prefix="/api/v1",
         tags=["history"],
         dependencies=READERS,
-        responses=refusals(503),
     )
 
     @routes.get("/recordings", response_model=Listing[Recording])
@@ -45,7 +44,7 @@ def router(recordings: InputRecorder, past: Past, clock: Clock) -> APIRouter:
             raise HTTPException(404, "There is no such recording that is finished.")
         return FileResponse(path, media_type=MEDIA_TYPE, filename=recording_id)
 
-    @routes.get("/world", response_model=PastWorld, responses=refusals(404))
+    @routes.get("/world", response_model=PastWorld)
     async def world(
         at: Annotated[Moment, Query(description="Which moment (ISO-8601)")],
     ) -> Response:

@@ -28,7 +28,7 @@ from iveg.models.snapshot import Climate, Tile
 from iveg.vital.evaluate import Evaluator
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.security.requirements import READERS, refusals
+from iveg.web.security.requirements import READERS
 from iveg.web.views import Views
 
 _NOTHING = CostmapModel(
@@ -97,7 +97,6 @@ def cells_router(
     @routes.get(
         "/costmap",
         response_model=CostmapModel,
-        responses=refusals(404),
     )
     async def costmap(
         robot: Annotated[str | None, Query(max_length=64)] = None,

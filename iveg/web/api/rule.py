@@ -17,7 +17,7 @@ from iveg.models.rule import parameter_fields
 from iveg.vital.operators import Rules
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.security.requirements import READERS, Operator, refusals
+from iveg.web.security.requirements import READERS, Operator
 
 _MOST_ALIASES = 200
 
@@ -94,7 +94,7 @@ def router(rules: Rules, trials: Trials, clock: Clock) -> APIRouter:
         items = [RuleModel.of(one) for one in reversed(rules.versions)]
         return Json(Listing(items=items))
 
-    @routes.put("/rule", response_model=RuleModel, responses=refusals(409, 428, 503))
+    @routes.put("/rule", response_model=RuleModel)
     async def change(body: RuleChange, who: Operator) -> Response:
         """Put a new version in force at once; parameters that are not named stay."""
         if body.version is None:
@@ -104,12 +104,9 @@ def router(rules: Rules, trials: Trials, clock: Clock) -> APIRouter:
             RuleModel.of(await rules.change(wanted, who.name, clock(), body.version))
         )
 
-    refused = refusals(409, 503)
-
     @routes.get(
         "/rule/trial",
         response_model=Listing[TrialModel],
-        responses=refused,
         dependencies=READERS,
     )
     async def current() -> Response:
@@ -117,20 +114,18 @@ def router(rules: Rules, trials: Trials, clock: Clock) -> APIRouter:
         trial = trials.current
         return Json(Listing(items=[TrialModel.of(trial)] if trial else []))
 
-    @routes.post(
-        "/rule/trial", response_model=TrialModel, status_code=201, responses=refused
-    )
+    @routes.post("/rule/trial", response_model=TrialModel, status_code=201)
     async def begin(body: RuleChange, who: Operator) -> Response:
         """Try the rule in force with other parameters, beside it."""
         wanted = body.applied_to(rules.current)
         return Json(TrialModel.of(trials.begin(wanted, who.name, clock())), 201)
 
-    @routes.delete("/rule/trial", response_model=TrialModel, responses=refused)
+    @routes.delete("/rule/trial", response_model=TrialModel)
     async def end(_: Operator) -> Response:
         """End the trial; the answer is how it stood."""
         return Json(TrialModel.of(trials.end()))
 
-    @routes.post("/rule/trial/promote", response_model=RuleModel, responses=refused)
+    @routes.post("/rule/trial/promote", response_model=RuleModel)
     async def promote(body: Promotion, who: Operator) -> Response:
         """Put the candidate in force, with what came of the trial."""
         return Json(RuleModel.of(await trials.promote(who.name, clock(), body.version)))

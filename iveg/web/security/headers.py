@@ -1,7 +1,7 @@
 """Headers and the size limit in front of every route.
 
 Pure ASGI.  Notifications come hundreds of times a second and no browser reads their
-answers, so their path is recognized first and passes the size limit alone.
+answers, so their path passes; their route has the same limit.
 """
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -34,8 +34,12 @@ _ALWAYS = (
 _TLS = ("strict-transport-security", "max-age=31536000")
 
 
-class SecurityHeaders:
-    """Adds the headers of SECURITY.md that a response has not set itself."""
+class Bounds:
+    """Adds the headers of SECURITY.md, and refuses a body over the limit.
+
+    A header that a response has set itself stays.  A body whose length is declared is
+    refused before it is read.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -51,7 +55,13 @@ class SecurityHeaders:
                 _guard(MutableHeaders(scope=message), scope)
             await send(message)
 
-        await self._app(scope, receive, send_guarded)
+        declared = Headers(scope=scope).get("content-length", "")
+        if declared.isdecimal() and int(declared) > MAX_BODY:
+            # The unread body would be taken for the next request.
+            problem = Problem(413, TOO_LONG, headers={"Connection": "close"})
+            await problem.response()(scope, receive, send_guarded)
+        else:
+            await self._app(scope, _counted(receive), send_guarded)
 
 
 def _guard(headers: MutableHeaders, scope: Scope) -> None:
@@ -63,28 +73,6 @@ def _guard(headers: MutableHeaders, scope: Scope) -> None:
     headers.setdefault("cache-control", "no-cache" if is_file else "no-store")
     if scope["scheme"] == "https":
         headers.setdefault(*_TLS)
-
-
-class BodyLimit:
-    """Refuses a body over the limit: before it is read where its length is declared."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request."""
-        if scope["type"] != "http" or scope["method"] == "GET":
-            await self._app(scope, receive, send)
-            return
-        declared = Headers(scope=scope).get("content-length", "")
-        if not declared.isdecimal():
-            receive = _counted(receive)
-        elif int(declared) > MAX_BODY:
-            # The unread body would be taken for the next request.
-            problem = Problem(413, TOO_LONG, headers={"Connection": "close"})
-            await problem.response()(scope, receive, send)
-            return
-        await self._app(scope, receive, send)
 
 
 def _counted(receive: Receive) -> Receive:

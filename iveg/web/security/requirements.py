@@ -1,13 +1,11 @@
 """Role that each route asks of its caller, and its refusals in the OpenAPI document.
 
 Every route declares its role with ``require``; ``declared_action`` reads it.  In the
-OpenAPI document any route may refuse with a problem (RFC 9457, ``web/problems.py``);
-statuses that need an explanation a route names itself: ``responses=refusals(409)``.
+OpenAPI document any route may refuse with a problem (RFC 9457, ``web/problems.py``).
 """
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from http import HTTPStatus
 from typing import Annotated, Any, Final
 
 from fastapi import Depends, FastAPI
@@ -83,7 +81,6 @@ def _calls(dependant: Dependant) -> Iterator[object]:
 
 # --- refusals in the OpenAPI document ----------------------------------------------
 
-_PROBLEM: Final = {"$ref": "#/components/schemas/Problem"}
 _SHAPE: Final[Mapping[str, Any]] = {
     "title": "Problem",
     "description": "Why a request was refused (RFC 9457); more members may follow.",
@@ -96,16 +93,16 @@ _SHAPE: Final[Mapping[str, Any]] = {
         "detail": {"type": "string", "description": "One sentence, for people."},
     },
 }
-_FASTAPIS_OWN: Final = ("HTTPValidationError", "ValidationError")
-
-
-def refusals(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """The ``responses`` of a route that refuses with these statuses."""
-    return {status: _problem(HTTPStatus(status).phrase) for status in statuses}
+_REFUSAL: Final[Mapping[str, Any]] = {
+    "description": "A refusal",
+    "content": {
+        "application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}
+    },
+}
 
 
 class DocumentedApp(FastAPI):
-    """An application whose document tells each refusal as it is sent."""
+    """An application whose document says that any route may refuse, and how."""
 
     def openapi(self) -> dict[str, Any]:
         """The document; made once."""
@@ -115,16 +112,7 @@ class DocumentedApp(FastAPI):
                 for operation in operations.values():
                     # FastAPI documents its own answer here, which is never sent.
                     operation["responses"].pop("422", None)
-                    operation["responses"]["default"] = _problem("A refusal")
+                    operation["responses"]["default"] = _REFUSAL
             schemas = document.setdefault("components", {}).setdefault("schemas", {})
-            for name in _FASTAPIS_OWN:
-                schemas.pop(name, None)
-            schemas["Problem"] = dict(_SHAPE)
+            schemas["Problem"] = _SHAPE
         return self.openapi_schema or {}
-
-
-def _problem(description: str) -> dict[str, Any]:
-    return {
-        "description": description,
-        "content": {"application/problem+json": {"schema": dict(_PROBLEM)}},
-    }

@@ -50,11 +50,8 @@ DAMAGE: dict[str, Callable[[Path], object]] = {
     "without its head": lambda path: path.write_bytes(
         b"\n".join(path.read_bytes().splitlines()[1:])
     ),
-    "one digit changed": lambda path: path.write_bytes(
-        path.read_bytes().replace(b"12.5", b"92.5")
-    ),
-    "made another": lambda path: path.write_bytes(
-        path.read_bytes().replace(b"operator", b"admin")
+    "no role": lambda path: path.write_bytes(
+        path.read_bytes().replace(b"operator", b"oper\xe1tor")
     ),
     "a folder": _replaced_by_a_folder,
 }

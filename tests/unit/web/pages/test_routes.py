@@ -15,7 +15,7 @@ from iveg.web.pages.drawing import Pages
 from iveg.web.pages.routes import router
 from iveg.web.pages.sentences import read_sentences
 from iveg.web.problems import NotSignedInError, install
-from iveg.web.security.headers import SecurityHeaders
+from iveg.web.security.headers import Bounds
 from iveg.web.security.roles import Principal
 
 Client = httpx.AsyncClient
@@ -73,7 +73,7 @@ async def browser(authenticator: FakeAuthenticator) -> AsyncIterator[Client]:
         )
     )
     install(app, pages.problem)
-    transport = httpx.ASGITransport(app=SecurityHeaders(app))
+    transport = httpx.ASGITransport(app=Bounds(app))
     headers = {"Accept": "text/html"}
     async with Client(
         transport=transport, base_url="http://iveg", headers=headers
