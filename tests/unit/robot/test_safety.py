@@ -11,16 +11,7 @@ from iveg.domain.observations import Hold, LaserScan, Origin
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
 from iveg.robot.orders import ATTEMPTS_KEPT, Report
-from tests.unit.robot.rig import (
-    AHEAD,
-    REST,
-    STEP_S,
-    Rig,
-    person,
-    release,
-    resume,
-    stop,
-)
+from tests.unit.robot.rig import AHEAD, REST, STEP_S, Rig, person, release, resume, stop
 
 
 def moving() -> Rig:
@@ -154,10 +145,7 @@ def test_a_robot_whose_pose_moves_while_its_wheels_rest_is_not_released() -> Non
 
 @pytest.mark.parametrize(
     ("ids", "challenge", "why"),
-    [
-        (["01A"], None, "holds_missing"),
-        (["01A", "boot-b1"], "old", "challenge"),
-    ],
+    [(["01A"], None, "holds_missing"), (["01A", "boot-b1"], "old", "challenge")],
 )
 def test_a_release_that_does_not_fit_lifts_no_hold(
     ids: list[str], challenge: str | None, why: str
