@@ -28,11 +28,7 @@ def measures(rates: UplinkRates, suffix: str, seconds: float = 10.0) -> list[flo
 
 @pytest.mark.parametrize(
     ("level", "rates_hz"),
-    [
-        (1.0, (1.0, 30.0, 30.0)),
-        (2.0, (1.0, 3.0, 30.0)),
-        (LEVELS, (1.0, 3.0, 5.0)),
-    ],
+    [(1.0, (1.0, 30.0, 30.0)), (2.0, (1.0, 3.0, 30.0)), (LEVELS, (1.0, 3.0, 5.0))],
 )
 def test_scans_give_way_first_then_looks_then_poses(
     level: float, rates_hz: tuple[float, ...]

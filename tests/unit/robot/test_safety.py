@@ -11,16 +11,7 @@ from iveg.domain.observations import Hold, LaserScan, Origin
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
 from iveg.robot.orders import ATTEMPTS_KEPT, Report
-from tests.unit.robot.rig import (
-    AHEAD,
-    REST,
-    STEP_S,
-    Rig,
-    person,
-    release,
-    resume,
-    stop,
-)
+from tests.unit.robot.rig import AHEAD, REST, STEP_S, Rig, person, release, resume, stop
 
 
 def moving() -> Rig:
@@ -154,10 +145,7 @@ def test_a_robot_whose_pose_moves_while_its_wheels_rest_is_not_released() -> Non
 
 @pytest.mark.parametrize(
     ("ids", "challenge", "why"),
-    [
-        (["01A"], None, "holds_missing"),
-        (["01A", "boot-b1"], "old", "challenge"),
-    ],
+    [(["01A"], None, "holds_missing"), (["01A", "boot-b1"], "old", "challenge")],
 )
 def test_a_release_that_does_not_fit_lifts_no_hold(
     ids: list[str], challenge: str | None, why: str
@@ -261,16 +249,12 @@ def test_a_pressed_button_is_one_hold_however_often_it_says_so() -> None:
 # --- the retained desired state -----------------------------------------------------
 
 
-def test_a_retained_stopped_holds_and_run_releases_nothing() -> None:
-    rig = moving()
+def test_a_retained_stopped_holds_until_released_and_run_releases_nothing() -> None:
+    rig = Rig().run(0.2)
+    rig.release()
     rig.level("stopped", "01A", "01B")
     rig.level("run")
     assert [hold.id for hold in rig.holds] == ["01A", "01B"]
-
-
-def test_a_retained_stopped_of_a_released_stop_holds_nothing() -> None:
-    rig = Rig().run(0.2)
-    rig.stop("01A")
     rig.release()
     rig.level("stopped", "01A")
     assert rig.holds == ()
@@ -341,20 +325,13 @@ def test_the_fourth_link_hold_of_a_minute_waits_for_a_person() -> None:
 
 
 def test_the_policy_slow_stays_at_half_however_long_the_silence() -> None:
-    rig = Rig(limits=Limits(on_link_loss="slow")).drive_on()
+    rig = Rig(limits=Limits(slow_s=2.0, on_link_loss="slow")).drive_on()
     rig.speaks = False
+    rig.run(1.3)
+    assert rig.factor == 1.0, "how long is a setting"
     rig.run(10.0)
     assert rig.holds == ()
     assert rig.twist == Twist2D(0.5, 0.2)
-
-
-def test_waiting_times_are_settings() -> None:
-    rig = Rig(limits=Limits(slow_s=2.0, stand_s=5.0)).drive_on()
-    rig.speaks = False
-    rig.run(1.3)
-    assert rig.factor == 1.0
-    rig.run(3.0)
-    assert (rig.factor, rig.holds) == (0.5, ())
 
 
 # --- own pose -----------------------------------------------------------------------

@@ -85,8 +85,7 @@ def seen(
 ) -> ros.Detection3D:
     sure = ros.ObjectHypothesisWithPose(ros.ObjectHypothesis(class_id, score))
     box = ros.BoundingBox3D(
-        ros.Pose(ros.Point(x, 0.0, 0.9)),
-        ros.Vector3(0.4, 0.6, 1.8),
+        ros.Pose(ros.Point(x, 0.0, 0.9)), ros.Vector3(0.4, 0.6, 1.8)
     )
     return ros.Detection3D(ros.Header(stamp(after), frame), (sure,), box, "7")
 

@@ -1,5 +1,7 @@
 """``robot.toml``: ROS's defaults where nothing is said, a key where it is wrong."""
 
+import re
+
 import pytest
 
 from iveg.domain.errors import DataFileError
@@ -11,8 +13,6 @@ WHOLE = """\
 [ros]
 domain = 7
 namespace = "/agi"
-interface = "eth0"
-peers = ["10.0.0.5"]
 
 [topics]
 odometry = "odometry/filtered"
@@ -38,35 +38,13 @@ depth = 2
 """
 
 
-def test_without_a_word_everything_is_as_ros_does_it() -> None:
-    config = read_config("", "robot.toml")
-
-    assert config == RobotConfig()
-    topics = config.full_topics
-    assert [topics[key] for key in ("odometry", "scan", "tf", "cmd_vel_out")] == [
-        "/odom",
-        "/scan",
-        "/tf",
-        "/cmd_vel",
-    ]
-    assert config.quality("scan") == Qos(reliable=False, depth=5)
-    assert config.quality("tf_static").transient_local
-    assert config.quality("tf").reliable
-
-
 def test_what_is_said_counts_and_the_rest_stays() -> None:
     config = read_config(WHOLE, "robot.toml")
 
     topics = config.full_topics
-    assert (config.ros.domain, config.ros.interface, config.ros.peers) == (
-        7,
-        "eth0",
-        ("10.0.0.5",),
-    )
-    assert (topics["odometry"], topics["scan"]) == (
-        "/agi/odometry/filtered",
-        "/agi/scan",
-    )
+    assert config.ros.domain == 7
+    assert topics["odometry"] == "/agi/odometry/filtered"
+    assert topics["scan"] == "/agi/scan"
     assert (topics["tf"], topics["battery"]) == ("/tf", "")
     assert (config.frames.map, config.frames.odom) == ("world", "odom")
     assert (config.drive.stamped_in, config.drive.max_speed) == (True, 0.6)
@@ -81,10 +59,7 @@ def test_what_is_said_counts_and_the_rest_stays() -> None:
         ("[ros]\nnamespace = '/a b'\n", ", ros.namespace: '/a b' is not a ROS"),
         ("[topics]\nscan = '1scan'\n", ", topics.scan"),
         ("[topics]\nscna = 'scan'\n", ", topics.scna.[key]: is unknown; known are"),
-        (
-            "[drive]\nstamped_in = 1\n",
-            ", drive.stamped_in: Input should be a valid bool",
-        ),
+        ("[drive]\nstamped_in = 1\n", ", drive.stamped_in: Input should be a valid"),
         ("[qos.scan]\ndepth = 0\n", ", qos.scan.depth: Input"),
         ("[ros]\ndomain == 3\n", ": is not TOML"),
     ],
@@ -92,10 +67,8 @@ def test_what_is_said_counts_and_the_rest_stays() -> None:
 def test_a_file_that_cannot_be_used_is_refused_with_its_key(
     text: str, where: str
 ) -> None:
-    with pytest.raises(DataFileError) as error:
+    with pytest.raises(DataFileError, match=re.escape(f"robot.toml{where}")):
         read_config(text, "robot.toml")
-
-    assert f"robot.toml{where}" in str(error.value)
 
 
 def test_a_namespace_of_the_command_line_is_held_to_the_same_rule() -> None:

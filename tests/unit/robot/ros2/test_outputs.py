@@ -9,7 +9,6 @@ import pytest
 from iveg.domain.feedback import Feedback, FeedbackAlert
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.observations import Origin
-from iveg.domain.parameters import Class
 from iveg.robot.feedback import Authors
 from iveg.robot.peer_alerts import Neighbour
 from iveg.robot.ros2 import outputs
@@ -18,11 +17,12 @@ from iveg.robot.ros2.outputs import DriveTopics
 from iveg.robot.ros2.reading import InputFaults, speed_of
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as ros
+from tests.unit.robot.rig import person as alert
 from tests.unit.robot.ros2.said import stamp
 
 # --- drive ------------------------------------------------------------------------
 
-AHEAD = ros.Twist(ros.Vector3(0.5, 0.1, 0.2), ros.Vector3(0.3, 0.4, -0.2))
+AHEAD = Twist2D(0.5, -0.2)
 
 
 def topics(**drive: bool) -> tuple[DriveTopics, InputFaults]:
@@ -31,15 +31,10 @@ def topics(**drive: bool) -> tuple[DriveTopics, InputFaults]:
     return found, input_faults
 
 
-def wished(after: float, forward: float = 0.5) -> bytes:
-    header = ros.Header(stamp(after), "base_link")
-    return cdr.write(ros.TwistStamped(header, ros.Twist(ros.Vector3(forward))))
-
-
-def test_of_a_twist_what_wheels_can_do_is_read() -> None:
-    found, _ = topics()
-
-    assert found.read(cdr.write(AHEAD), 0.0) == Twist2D(0.5, -0.2)
+def wished(after: float) -> bytes:
+    """What wheels can do of it is ``AHEAD``."""
+    twist = ros.Twist(ros.Vector3(0.5, 0.1, 0.2), ros.Vector3(0.3, 0.4, -0.2))
+    return cdr.write(ros.TwistStamped(ros.Header(stamp(after), "base_link"), twist))
 
 
 @pytest.mark.parametrize(
@@ -62,21 +57,15 @@ def test_a_twist_that_nobody_can_mean_is_a_wish_to_rest(
     assert speed_of(input_faults.faults(5.0)) == (0.5, code)
 
 
-def test_a_stamped_twist_that_was_overtaken_is_dropped() -> None:
+def test_an_overtaken_twist_is_dropped_and_a_clock_that_was_set_back_believed() -> None:
     found, input_faults = topics(stamped_in=True)
+    read = [
+        found.read(wished(stamped), at)
+        for at, stamped in enumerate((1.0, 0.9, -3600.0, -3599.9))
+    ]
 
-    first, late = found.read(wished(1.0), 0.0), found.read(wished(0.9), 0.1)
-
-    assert (first, late) == (Twist2D(0.5, 0.0), None)
-    assert speed_of(input_faults.faults(0.1)) == (0.5, "time_back")
-
-
-def test_a_sender_whose_clock_was_set_back_is_believed() -> None:
-    found, _ = topics(stamped_in=True)
-    found.read(wished(1.0), 0.0)
-
-    assert found.read(wished(-3600.0), 0.1) == Twist2D(0.5, 0.0)
-    assert found.read(wished(-3599.9), 0.2) == Twist2D(0.5, 0.0)
+    assert read == [AHEAD, None, AHEAD, AHEAD]
+    assert speed_of(input_faults.faults(3.0)) == (0.5, "time_back")
 
 
 def test_what_the_gate_says_is_written_as_the_base_wants_it() -> None:
@@ -98,39 +87,23 @@ HERE = Pose2D(1.0, 2.0, math.pi / 2)
 STAMP = ros.Time(7, 0)
 
 
-def alert(
-    x: float, y: float, class_: Class = "person", name: str = "farmer"
-) -> FeedbackAlert:
-    return FeedbackAlert("d", "", class_, name, 0.9, (x, y, 0.9), 2.0, "AGII")
-
-
 def told(*alerts: FeedbackAlert, who: str = "AGII", x: float = 9.0) -> Feedback:
     return Feedback(who, Origin("c", 1), None, alerts, Pose2D(x, 2.0, 0.0))
 
 
-def present(*feedback: Feedback) -> list[Neighbour]:
+def present(feedback: Feedback) -> list[Neighbour]:
     known = Authors("AGI", 1.0)
-    for one in feedback:
-        known.apply(one.robot_id, one, HERE, None, 10.0)
+    known.apply(feedback.robot_id, feedback, HERE, None, 10.0)
     return known.neighbours(10.0)
 
 
-def points(cloud: ros.PointCloud2) -> np.ndarray:
-    return np.frombuffer(cloud.data.tobytes(), "<f4").reshape(-1, 3)
-
-
-def test_nobody_is_a_neighbour_of_himself() -> None:
-    own = told(alert(1.2, 2.0, "robot", "AGII"), who="AGI", x=1.0)
-    named = told(alert(5.0, 5.0, "robot", "AGI"))
+def test_nobody_is_a_neighbour_of_himself_but_a_person_at_hand_is_one() -> None:
+    own = told(alert(1.2, 2.0, class_="robot", class_id="AGII"), who="AGI", x=1.0)
+    named = told(alert(5.0, 5.0, class_="robot", class_id="AGI"))
 
     assert present(own) == []
     assert [one.name for one in present(named)] == ["AGII"]
-
-
-def test_a_person_within_reach_of_the_hand_is_not_taken_for_oneself() -> None:
-    found = present(told(alert(1.2, 2.0), who="AGI"))
-
-    assert [one.kind for one in found] == ["person"]
+    assert [one.kind for one in present(told(alert(1.2, 2.0), who="AGI"))] == ["person"]
 
 
 def test_a_peer_that_was_taken_away_leaves_although_its_last_pose_is_still_told() -> (
@@ -154,7 +127,8 @@ def test_a_person_becomes_a_disc_in_the_robots_own_frame() -> None:
     person = Neighbour("person", "farmer", 1.0, 4.0, 0.35, 2.0)
 
     cloud = outputs.cloud([person], HERE, STAMP, "base_link")
-    near = points(cloud)[np.hypot(*points(cloud).T[:2]) < outputs.REACH_M]
+    points = np.frombuffer(cloud.data.tobytes(), "<f4").reshape(-1, 3)
+    near = points[np.hypot(*points.T[:2]) < outputs.REACH_M]
 
     assert cloud.header.frame_id == "base_link"
     assert near[:, 0].mean() == pytest.approx(2.0, abs=0.01)
