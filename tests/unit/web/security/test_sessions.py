@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from iveg.adapters.access_file import AccessFile, earlier_sessions
-from iveg.adapters.files import Form, write_lines
-from iveg.domain.accounts import Access, AccessBook
+from iveg.adapters.access_file import AccessFile
+from iveg.domain import accounts
+from iveg.domain.accounts import AccessBook
 from iveg.web.security.roles import Principal
 from iveg.web.security.sessions import Sessions
 from tests.fakes.clock import FakeClock
@@ -56,16 +56,6 @@ def test_the_file_holds_digests_alone_and_only_its_owner_reads_it(
     assert path.stat().st_mode & 0o777 == 0o600
 
 
-def test_who_signed_out_is_not_back_after_a_restart(start: Restart) -> None:
-    sessions = start()
-    token = sessions.open("Ana", "operator")
-    who = sessions.find(token)
-
-    assert who is not None
-    sessions.end(who.session or b"")
-    assert start().find(token) is None
-
-
 def test_f42_the_time_that_iveg_was_down_counts_and_stop_is_left_for_twelve_hours(
     start: Restart, clock: FakeClock
 ) -> None:
@@ -80,6 +70,50 @@ def test_f42_the_time_that_iveg_was_down_counts_and_stop_is_left_for_twelve_hour
     assert expired.may("stop")
     assert not expired.may("release")
     assert gone is None
+
+
+def test_use_keeps_a_session_alive_but_not_beyond_a_day(clock: FakeClock) -> None:
+    sessions = Sessions(clock, AccessBook())
+    token = sessions.open("Ana", "operator")
+
+    roles = []
+    for _ in range(6):
+        clock.now += 5 * HOUR
+        found = sessions.find(token)
+        assert found is not None
+        roles.append(found.role)
+
+    assert roles == ["operator"] * 4 + ["expired"] * 2
+
+
+def test_watching_alone_does_not_keep_a_session_alive(clock: FakeClock) -> None:
+    sessions = Sessions(clock, AccessBook())
+    principal = sessions.find(sessions.open("Ana", "operator"))
+    assert principal is not None
+
+    roles = []
+    for hours in (11, 2):
+        clock.now += hours * HOUR
+        current = sessions.current(principal)
+        assert current is not None
+        roles.append(current.role)
+
+    assert roles == ["operator", "expired"]
+
+
+def test_sessions_are_bounded_and_the_longest_idle_gives_way(
+    clock: FakeClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(accounts, "MOST_SESSIONS", 2)
+    sessions = Sessions(clock, AccessBook())
+    first, second = sessions.open("a", "viewer"), sessions.open("b", "viewer")
+    clock.now += 1
+    sessions.find(first)
+
+    third = sessions.open("c", "viewer")
+
+    there = [sessions.find(token) is not None for token in (first, second, third)]
+    assert there == [True, False, True]
 
 
 def test_a_viewer_stays_for_thirty_days_unused_and_may_then_stop(
@@ -140,23 +174,3 @@ def test_a_session_that_was_lowered_is_a_viewers_and_stays_one(start: Restart) -
         ("viewer", True),
         ("operator", False),
     ]
-
-
-def test_sessions_of_earlier_versions_stay(tmp_path: Path, clock: FakeClock) -> None:
-    now, before = clock().wall, tmp_path / "sessions.jsonl"
-    kept = {
-        "digest": hashlib.sha256(b"token").hexdigest(),
-        "name": "Nave 2",
-        "role": "viewer",
-        "method": "tablet",
-        "holder": "P1",
-        "began": now,
-        "seen": now,
-    }
-    write_lines(before, Form("sessions"), [kept])
-
-    book = AccessBook(Access(sessions=earlier_sessions(before)))
-    found = Sessions(clock, book).find("token")
-
-    assert found is not None
-    assert (found.name, found.role, found.method) == ("Nave 2", "viewer", "link")
