@@ -11,7 +11,6 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
 from iveg.domain.errors import (
-    CommandRefusedError,
     DataFileError,
     HopError,
     IvegError,
@@ -19,9 +18,7 @@ from iveg.domain.errors import (
     UnreadableError,
 )
 from iveg.web.problems import (
-    ForeignOriginError,
-    NotJsonError,
-    NotSignedInError,
+    Page,
     Problem,
     install,
     problem_of,
@@ -36,8 +33,9 @@ class Threshold(BaseModel):
     value: float
 
 
-def build_app() -> FastAPI:
+def browse(page: Page | None = None) -> Client:
     app = FastAPI()
+    install(app, page)
 
     @app.post("/threshold")
     async def threshold(body: Annotated[Threshold, Body()]) -> None: ...
@@ -46,31 +44,21 @@ def build_app() -> FastAPI:
     async def boom() -> None:
         raise ZeroDivisionError("the secret of the inside")
 
-    return app
+    transport = httpx.ASGITransport(app, raise_app_exceptions=False)
+    return Client(transport=transport, base_url="http://iveg.test")
 
 
 @pytest.fixture
 async def client() -> AsyncIterator[Client]:
-    app = build_app()
-    install(app)
-    async with browse(app) as client:
+    async with browse() as client:
         yield client
-
-
-def browse(app: FastAPI) -> Client:
-    transport = httpx.ASGITransport(app, raise_app_exceptions=False)
-    return Client(transport=transport, base_url="http://iveg.test")
 
 
 @pytest.mark.parametrize(
     ("error", "status"),
     [
         (UnreadableError("not_json", "line 1"), 400),
-        (NotSignedInError(), 401),
-        (ForeignOriginError("same origin"), 403),
         (UnknownRobotError("R9"), 404),
-        (CommandRefusedError("AGI", "release", "not standing"), 409),
-        (NotJsonError(), 415),
         (HopError("orion", "http://10.0.0.7:1026 refused"), 503),
         (DataFileError("a.json", "", "broken"), 500),
         (IvegError("unforeseen"), 500),
@@ -103,27 +91,25 @@ async def test_a_problem_is_problem_json(client: Client) -> None:
 
 @pytest.mark.parametrize(
     "body",
-    [b'{"value": NaN}', b'{"value": Infinity}', b'{"value": "12345678"}', b"{}", b"[]"],
+    [b'{"value": NaN}', b'{"value": "12345678"}', b"[]"],
 )
 async def test_what_is_readable_but_invalid_says_where_and_never_echoes_it(
     client: Client, body: bytes
 ) -> None:
-    answer = await post(client, body)
+    headers = {"Content-Type": "application/json"}
+    answer = await client.post("/threshold", content=body, headers=headers)
 
     assert answer.status_code == 422
     assert answer.json()["errors"][0]["where"].startswith("body")
     assert "12345678" not in answer.text
     assert "NaN" not in answer.text
-    assert "Infinity" not in answer.text
 
 
 async def test_a_person_gets_a_page_and_a_program_never() -> None:
     def page(request: Request, problem: Problem) -> Response:
         return PlainTextResponse(f"page {problem.status}", problem.status)
 
-    app = build_app()
-    install(app, page)
-    async with browse(app) as client:
+    async with browse(page) as client:
         person = await client.get("/nowhere", headers={"Accept": "text/html,*/*"})
         script = await client.get("/nowhere", headers={"Accept": "application/json"})
         api = await client.get("/api/v1/boom", headers={"Accept": "text/html"})
@@ -132,8 +118,3 @@ async def test_a_person_gets_a_page_and_a_program_never() -> None:
     assert script.json()["status"] == 404
     assert api.json()["status"] == 500
     assert "secret" not in api.text
-
-
-async def post(client: Client, body: bytes) -> httpx.Response:
-    headers = {"Content-Type": "application/json"}
-    return await client.post("/threshold", content=body, headers=headers)

@@ -9,13 +9,11 @@ from typing import Any
 import httpx
 import pytest
 
-from iveg.domain.accounts import Account, digest_of
+from iveg.domain.accounts import digest_of
 from iveg.domain.records import AuditRecord
 from iveg.web.api import account
-from iveg.web.security.sessions import IDLE_S
-from tests.unit.web.security.test_people import ANA, OWN, PeoplesDesk, enter
+from tests.unit.web.security.test_people import ANA, CHIEF, OWN, PeoplesDesk, enter
 
-CHIEF = Account("P9", "Chief", "admin", password="#acelga-1234")
 CHANGE = {"old": "acelga-1234", "new": "berenjena-77"}
 SESSIONS, OWN_SESSIONS = "/api/v1/sessions", "/api/v1/account/sessions"
 TOKENS = "/api/v1/tokens"
@@ -66,19 +64,6 @@ async def stop(page: httpx.AsyncClient) -> int:
 
 async def change(page: httpx.AsyncClient, **body: str) -> httpx.Response:
     return await page.put("/api/v1/account/password", json=CHANGE | body)
-
-
-async def test_everybody_is_told_who_they_are(desk: AccessDesk) -> None:
-    desk.book.accounts["P1"] = replace(ANA, ends_at=2e9)
-    async with desk.ana() as ana, desk.browser() as page:
-        told = [(await one.get("/api/v1/account")).json() for one in (ana, page)]
-
-    assert [(one["name"], one["role"], one["account"]) for one in told] == [
-        ("Ana Núñez", "operator", True),
-        ("ana", "operator", False),
-    ]
-    assert [one["ends_at"] is None for one in told] == [False, True]
-    assert [one["signed_in_at"] is None for one in told] == [False, False]
 
 
 async def test_a_new_password_ends_the_other_sessions_and_this_one_begins_anew(
@@ -138,7 +123,7 @@ async def test_a_reset_meanwhile_is_not_undone_by_the_old_password(
 # --- everybody's accounts ------------------------------------------------------------
 
 
-async def test_an_invitation_is_shown_once_and_begins_the_account(
+async def test_an_invitation_is_shown_once_works_once_and_begins_the_account(
     desk: AccessDesk,
 ) -> None:
     body = {"name": "Luz Gil", "role": "operator", "days": 2}
@@ -148,12 +133,14 @@ async def test_an_invitation_is_shown_once_and_begins_the_account(
         link = made.json()["code"]["link"]
         proof = {"invitation": link.partition("#invitation=")[2]}
         begun = await enter(page, **proof, password="berenjena-77")
+        again = await enter(page, **proof, password="berenjena-78")
         desk.clock.now += 2 * 86_400.0 - 1.0
         before = await enter(page, name="Luz Gil", password="berenjena-77")
         desk.clock.now += 2.0
         after = await enter(page, name="Luz Gil", password="berenjena-77")
 
-    assert (made.status_code, begun, before, after) == (201, 204, 204, 401)
+    assert (made.status_code, begun, again) == (201, 204, 401)
+    assert (before, after) == (204, 401)
     assert made.json()["code"]["image"].startswith("data:image/svg+xml")
     assert made.json()["user"]["state"] == "invited"
     (kept,) = (one for one in desk.book.accounts.values() if one.name == "Luz Gil")
@@ -220,11 +207,8 @@ async def test_nobody_changes_their_own_account_so_that_an_admin_stays(
     ("body", "status"),
     [
         ({"name": "ANA núñez", "role": "viewer"}, 409),
-        ({"name": "a<b", "role": "viewer"}, 422),
         ({"name": "Console", "role": "viewer"}, 422),
         ({"name": "Luz", "role": "program"}, 422),
-        ({"name": "Luz", "role": "viewer", "days": 0}, 422),
-        ({"name": "Luz", "role": "viewer", "password": "x"}, 422),
     ],
 )
 async def test_what_cannot_be_an_account_is_refused(
@@ -305,19 +289,6 @@ async def test_people_end_their_own_elsewhere_and_nobody_elses(
     assert stops == [202, 401, 202]
 
 
-async def test_a_page_that_an_expired_session_opens_says_so_and_keeps_its_stops(
-    desk: AccessDesk,
-) -> None:
-    async with desk.ana() as page:
-        desk.clock.now += IDLE_S + 60.0
-        shown = await page.get("/", headers={"Accept": "text/html"})
-        left = await page.post("/signout")
-
-    assert (shown.status_code, left.status_code) == (403, 303)
-    assert 'data-role="expired"' in shown.text
-    assert 'data-stop="fleet"' in shown.text
-
-
 # --- tokens -------------------------------------------------------------------------
 
 
@@ -361,13 +332,7 @@ async def test_who_is_revoked_is_out_before_the_answer(desk: AccessDesk) -> None
 
 
 @pytest.mark.parametrize(
-    ("body", "status"),
-    [
-        ({"name": "MES-read"}, 409),
-        ({"name": "a<b"}, 422),
-        ({"scope": "admin"}, 422),
-        ({"days": 0}, 422),
-    ],
+    ("body", "status"), [({"name": "MES-read"}, 409), ({"scope": "admin"}, 422)]
 )
 async def test_what_cannot_be_a_token_is_refused(
     desk: AccessDesk, body: dict[str, object], status: int

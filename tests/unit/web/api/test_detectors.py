@@ -31,7 +31,7 @@ def factor(desk: WebDesk) -> float:
     return desk.evaluator.speed_limits["AGII"].speed_factor
 
 
-async def test_out_of_service_nobody_waits_for_its_pictures() -> None:
+async def test_out_of_service_nobody_waits_for_it_until_it_is_put_back() -> None:
     desk = blind()
     before = factor(desk)
 
@@ -47,6 +47,13 @@ async def test_out_of_service_nobody_waits_for_its_pictures() -> None:
         "out_since": "2023-11-14T22:13:20.000Z",
         "out_reason": "lens broken",
     }
+
+    await put(desk, in_service=True)
+    await desk.wait(0.1)
+
+    assert factor(desk) == 0.5
+    assert desk.detector_store.written == {}
+    assert "log.detector_in" in desk.sentences()
 
 
 async def test_it_is_on_the_record_with_its_author_and_a_p3_while_it_lasts() -> None:
@@ -76,18 +83,6 @@ async def test_without_a_reason_it_stays_in_service(reason: str) -> None:
 
     assert (answer.status_code, factor(desk)) == (422, 0.5)
     assert desk.detector_store.written == {}
-
-
-async def test_put_back_in_service_it_is_waited_for_again() -> None:
-    desk = blind()
-    await put(desk)
-
-    await put(desk, in_service=True)
-    await desk.wait(0.1)
-
-    assert factor(desk) == 0.5
-    assert desk.detector_store.written == {}
-    assert "log.detector_in" in desk.sentences()
 
 
 async def test_the_robots_next_boot_puts_it_back_and_says_so() -> None:

@@ -37,18 +37,30 @@ async def client() -> AsyncIterator[Client]:
         yield client
 
 
-async def test_every_answer_binds_the_browser(client: Client) -> None:
-    for path in ("/", "/nowhere", "/static/js/main.js", "/api/v1/size"):
-        headers = (await client.get(path)).headers
+@pytest.mark.parametrize(
+    ("path", "kept"),
+    [
+        ("/", "no-store"),
+        ("/nowhere", "no-store"),
+        ("/static/js/main.js", "no-cache"),
+        ("/api/v1/size", "no-store"),
+    ],
+)
+async def test_every_answer_binds_the_browser_and_data_is_never_stored(
+    client: Client, path: str, kept: str
+) -> None:
+    answer = await client.get(path)
+    by_tls = await client.get(f"https://i{path}")
 
-        assert headers["content-security-policy"] == CONTENT_SECURITY_POLICY
-        assert headers["x-content-type-options"] == "nosniff"
-        assert headers["referrer-policy"] == "no-referrer"
-        assert headers["cross-origin-opener-policy"] == "same-origin"
-        assert headers["cross-origin-resource-policy"] == "same-origin"
-        assert "strict-transport-security" not in headers
-    headers = (await client.get("https://i/")).headers
-    assert headers["strict-transport-security"] == "max-age=31536000"
+    headers = answer.headers
+    assert headers["cache-control"] == kept
+    assert headers["content-security-policy"] == CONTENT_SECURITY_POLICY
+    assert headers["x-content-type-options"] == "nosniff"
+    assert headers["referrer-policy"] == "no-referrer"
+    assert headers["cross-origin-opener-policy"] == "same-origin"
+    assert headers["cross-origin-resource-policy"] == "same-origin"
+    assert "strict-transport-security" not in headers
+    assert by_tls.headers["strict-transport-security"] == "max-age=31536000"
 
 
 def test_the_policy_allows_nothing_inline_and_no_other_host() -> None:
@@ -61,16 +73,6 @@ def test_the_policy_allows_nothing_inline_and_no_other_host() -> None:
     assert "http" not in policy
     assert "unsafe" not in policy
     assert "blob:" not in policy
-
-
-async def test_data_is_never_stored_and_files_are_asked_for_again(
-    client: Client,
-) -> None:
-    data = await client.get("/api/v1/size")
-    file = await client.get("/static/js/main.js")
-
-    assert data.headers["cache-control"] == "no-store"
-    assert file.headers["cache-control"] == "no-cache"
 
 
 async def test_a_declared_body_over_the_limit_is_refused_unread(

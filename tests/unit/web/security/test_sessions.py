@@ -8,6 +8,7 @@ import pytest
 
 from iveg.adapters.access_file import AccessFile, earlier_sessions
 from iveg.adapters.files import Form, write_lines
+from iveg.domain import accounts
 from iveg.domain.accounts import Access, AccessBook
 from iveg.web.security.sessions import Sessions
 from tests.fakes.clock import FakeClock
@@ -54,16 +55,6 @@ def test_the_file_holds_digests_alone_and_only_its_owner_reads_it(
     assert path.stat().st_mode & 0o777 == 0o600
 
 
-def test_who_signed_out_is_not_back_after_a_restart(start: Restart) -> None:
-    sessions = start()
-    token = sessions.open("Ana", "operator")
-    who = sessions.find(token)
-
-    assert who is not None
-    sessions.end(who.session or b"")
-    assert start().find(token) is None
-
-
 def test_f42_the_time_that_iveg_was_down_counts_and_stop_is_left_for_twelve_hours(
     start: Restart, clock: FakeClock
 ) -> None:
@@ -78,6 +69,50 @@ def test_f42_the_time_that_iveg_was_down_counts_and_stop_is_left_for_twelve_hour
     assert expired.may("stop")
     assert not expired.may("release")
     assert gone is None
+
+
+def test_use_keeps_a_session_alive_but_not_beyond_a_day(clock: FakeClock) -> None:
+    sessions = Sessions(clock, AccessBook())
+    token = sessions.open("Ana", "operator")
+
+    roles = []
+    for _ in range(6):
+        clock.now += 5 * HOUR
+        found = sessions.find(token)
+        assert found is not None
+        roles.append(found.role)
+
+    assert roles == ["operator"] * 4 + ["expired"] * 2
+
+
+def test_watching_alone_does_not_keep_a_session_alive(clock: FakeClock) -> None:
+    sessions = Sessions(clock, AccessBook())
+    principal = sessions.find(sessions.open("Ana", "operator"))
+    assert principal is not None
+
+    roles = []
+    for hours in (11, 2):
+        clock.now += hours * HOUR
+        current = sessions.current(principal)
+        assert current is not None
+        roles.append(current.role)
+
+    assert roles == ["operator", "expired"]
+
+
+def test_sessions_are_bounded_and_the_longest_idle_gives_way(
+    clock: FakeClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(accounts, "MOST_SESSIONS", 2)
+    sessions = Sessions(clock, AccessBook())
+    first, second = sessions.open("a", "viewer"), sessions.open("b", "viewer")
+    clock.now += 1
+    sessions.find(first)
+
+    third = sessions.open("c", "viewer")
+
+    there = [sessions.find(token) is not None for token in (first, second, third)]
+    assert there == [True, False, True]
 
 
 def test_a_viewer_stays_for_thirty_days_unused_and_may_then_stop(
