@@ -13,13 +13,12 @@ from playwright.sync_api import Browser, Locator, Page, expect
 from tests.e2e.conftest import OpenPage, live_page
 from tests.e2e.hands import ask, begin_hold, let_go, look, open_menu
 from tests.e2e.puppet import CRUISE, Puppet, described, puppet
-from tests.e2e.reading import card, evaluate, strip_stop
+from tests.e2e.reading import STANDING, card, evaluate, strip_stop
 from tests.processes import EMULATOR, Site, site, until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
 STEPS = "asked", "acknowledged", "standing"
-STANDING = re.compile(r"PARADO \(hace [\d,]+ s\)")
 
 _WATCH = """([robot]) => {
   const control = document.querySelector(`#stops [data-stop="${robot}"]`);
@@ -40,9 +39,7 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     directory = tmp_path_factory.mktemp("stop")
     settings = {"IVEG_ROBOTS": "AGI,AGV", "IVEG_FLEET": described(directory, "AGV")}
     with site(directory, **settings) as place:
-        place.start("fiware").wait_until_ready()
-        place.start("serve")
-        place.wait_until_served()
+        place.serve()
         place.start(*EMULATOR, "--robots", "1")
         place.wait_until_live(robots=1)
         yield place
@@ -81,9 +78,6 @@ def agi(page: Page, stack: Site) -> Locator:
 def english(open_page: OpenPage) -> Page:
     """The same page in English."""
     return _listening(open_page(locale="en-GB", route="/about"))
-
-
-# --- the link ------------------------------------------------------------------------
 
 
 # --- unconfirmed ---------------------------------------------------------------------

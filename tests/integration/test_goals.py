@@ -20,9 +20,7 @@ THERE = {"kind": "here", "x": 10.0, "y": 7.5}
 def driving(tmp_path: Path) -> Iterator[Site]:
     """FIWARE, dashboard and robots; orders go through Orion and the agent alone."""
     with site(tmp_path, IVEG_STOP_DIRECT="off") as place:
-        place.start("fiware").wait_until_ready()
-        place.start("serve")
-        place.wait_until_served()
+        place.serve()
         place.start(*EMULATOR, "--seed", "3", "--profile", "perfect")
         place.wait_until_live()
         place.wait_until_whole()
