@@ -8,7 +8,14 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.consoles import console
 from tests.e2e.conftest import OpenPage
-from tests.e2e.reading import COVERED_STOPS, OVERFLOW, evaluate, serious, visit
+from tests.e2e.reading import (
+    COVERED_STOPS,
+    OVERFLOW,
+    evaluate,
+    serious,
+    strip_stop,
+    visit,
+)
 from tests.patience import AGAIN
 from tests.processes import Site, until
 
@@ -58,6 +65,7 @@ def test_what_an_admin_sees_is_accessible_and_who_is_ended_while_watching_is_out
     chief.keyboard.press("Enter")
     chief.keyboard.press("Enter")
     expect(eva.locator("body")).to_have_attribute("data-connection", "signed-out")
+    expect(strip_stop(eva, "AGI")).to_have_attribute("data-state", "lost")
     expect(row).to_have_count(0)
     stopped = eva.context.request.post(
         f"{stack.url}/api/v1/robots/AGI/stop", headers=stack.own_page, max_retries=AGAIN

@@ -23,24 +23,6 @@ THEMES = ("light", "dark", "sunlight")
 PROBE = "<img src=x onerror=window.probed=1>"
 
 
-def test_a_distance_is_measured_with_two_taps_and_with_keys(page: Page) -> None:
-    page.locator("#map-measure").click()
-    expect(page.locator("#measured")).to_contain_text("primer punto")
-    canvas = page.locator("#map")
-
-    canvas.click(position={"x": 200, "y": 300})
-    expect(page.locator("#measured")).to_contain_text("segundo punto")
-    canvas.click(position={"x": 400, "y": 300})
-    expect(page.locator("#measured")).to_have_text(re.compile(r"^\d+,\d\d m$"))
-
-    canvas.focus()
-    page.keyboard.press("Enter")
-    expect(page.locator("#measured")).to_contain_text("segundo punto")
-    page.locator("#map-measure").focus()
-    page.keyboard.press("Escape")
-    expect(page.locator("#measured")).to_be_hidden()
-
-
 def test_what_a_robot_believes_is_shown_named_and_remembered(page: Page) -> None:
     page.locator("[data-opens=layers-panel]").click()
     page.get_by_role("radio", name="AGII").check()
