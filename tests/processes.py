@@ -204,6 +204,12 @@ class Site:
             verify=NO_TLS,
         )
 
+    def serve(self) -> None:
+        """FIWARE and the dashboard run, and the page answers."""
+        self.start("fiware").wait_until_ready()
+        self.start("serve")
+        self.wait_until_served()
+
     def wait_until_served(self) -> None:
         """Until the page answers."""
         until(lambda: _answers(f"{self.url}/healthz"), "/healthz")

@@ -31,9 +31,7 @@ def driving_site(
 ) -> Iterator[Site]:
     """FIWARE, dashboard and emulator, driving."""
     with site(directory, **settings) as place:
-        place.start("fiware").wait_until_ready()
-        place.start("serve")
-        place.wait_until_served()
+        place.serve()
         place.start(*EMULATOR, "--scenario", scenario)
         place.wait_until_live()
         yield place

@@ -164,9 +164,7 @@ def stage(directory: Path, **settings: str) -> Iterator[tuple[Site, Puppet]]:
     """FIWARE, dashboard and one puppet; no emulator."""
     fleet = described(directory, "AGV")
     with site(directory, IVEG_FLEET=fleet, **settings) as place:
-        place.start("fiware").wait_until_ready()
-        place.start("serve")
-        place.wait_until_served()
+        place.serve()
         with puppet("AGV", place.settings["IVEG_MQTT_URL"]) as robot:
             place.wait_until_live(robots=1)
             yield place, robot

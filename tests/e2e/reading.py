@@ -6,6 +6,11 @@ from typing import Any
 from axe_playwright_python.base import AXE_SCRIPT
 from playwright.sync_api import Locator, Page
 
+STANDING = re.compile(r"PARADO \(hace [\d,]+ s\)")
+"""What a control says of a robot that stands after a STOP."""
+HALVED = re.compile(r"50\W?%: .*(?:persona|robot)")
+"""What the log says of a robot that was slowed, and why."""
+
 
 def card(page: Page, robot: str) -> Locator:
     """The card of a robot."""
@@ -33,6 +38,25 @@ def wait_for_mode(page: Page, robot: str, *modes: str) -> None:
 def evaluate(page: Page, script: str, *arguments: object) -> Any:
     """The result of a function in the page."""
     return page.evaluate(script, list(arguments))
+
+
+def wait_for_paintings(page: Page, *robots: str) -> None:
+    """Until more than thirty poses and thirty scans of each robot were painted."""
+    evaluate(page, _NOTE_PAINTED)
+    for robot in robots:
+        for kind in ("odom", "lidar"):
+            page.wait_for_function(
+                "key => window.painted[key]?.size > 30", arg=f"{robot} {kind}"
+            )
+
+
+_NOTE_PAINTED = """() => {
+  window.painted = {};
+  window.__onPaint = ({robot, kind, stamp}) => {
+    const key = `${robot} ${kind}`;
+    (window.painted[key] ??= new Set()).add(stamp);
+  };
+}"""
 
 
 def serious(page: Page, *rules: str) -> list[str]:

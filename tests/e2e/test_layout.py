@@ -6,6 +6,7 @@ each fleet has one page for all sizes.
 
 import json
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -43,7 +44,7 @@ from tests.staged import STAGED
 
 pytestmark = pytest.mark.e2e
 
-APART_PX = 24
+APART_PX, LARGE_PX = 24, 64
 DESKTOPS = ((1200, 800), (1440, 900), (1500, 900), (1920, 1080))
 OTHERS = ((1024, 768), (844, 390), (667, 375), (768, 1024), (390, 844), (360, 740))
 SIZES = (*DESKTOPS, *OTHERS)
@@ -105,7 +106,6 @@ def past_of_ten(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 @pytest.fixture
 def show(browser: Browser, past: Site) -> Iterator[Show]:
     """Opens the live page, or another, of a snapshot."""
-    opened = []
 
     def open_one(
         told: Frozen,
@@ -119,15 +119,13 @@ def show(browser: Browser, past: Site) -> Iterator[Show]:
         context = frozen_page(
             browser, place, size, tell=lambda: told, lines=lines, **look
         )
-        page = context.__enter__()
-        opened.append(context)
+        page = pages.enter_context(context)
         page.goto(place.url + route)
         settle(page, ready)
         return Told(page, lines, told["snapshot"]["robots"])
 
-    yield open_one
-    for context in opened:
-        context.__exit__(None, None, None)
+    with ExitStack() as pages:
+        yield open_one
 
 
 def test_the_snapshot_is_one_that_a_server_may_send() -> None:
@@ -144,26 +142,13 @@ def test_nothing_overflows_or_covers_a_stop_and_stops_stand_apart(
     show: Show, count: int
 ) -> None:
     told = show(snapshot(count))
-    wanted = {
-        "overflow": 0,
-        "covered": [],
-        "apart": True,
-        "large": True,
-        "header": [],
-        "tags": [],
-    }
 
     for size in SIZES:
         page = told.at(size)
-        found = {
-            "overflow": evaluate(page, OVERFLOW),
-            "covered": evaluate(page, COVERED_STOPS),
-            "apart": evaluate(page, NEAREST_STOP) >= APART_PX,
-            "large": evaluate(page, SMALLEST_STOP) >= 64,
-            "header": evaluate(page, COLLISIONS),
-            "tags": evaluate(page, TAGS_ON_WORDS),
-        }
-        assert found == wanted, size
+        assert evaluate(page, OVERFLOW) == 0, size
+        assert evaluate(page, COVERED_STOPS) == [], size
+        assert evaluate(page, NEAREST_STOP) >= APART_PX, size
+        assert evaluate(page, SMALLEST_STOP) >= LARGE_PX, size
 
 
 def test_no_page_no_dialog_and_no_message_covers_a_stop_in_any_window(
@@ -182,7 +167,7 @@ def test_no_page_no_dialog_and_no_message_covers_a_stop_in_any_window(
             found[route, size] = [
                 *evaluate(page, COVERED_STOPS),
                 *([] if evaluate(page, OVERFLOW) <= 0 else ["too wide"]),
-                *([] if evaluate(page, SMALLEST_STOP) >= 64 else ["too small"]),
+                *([] if evaluate(page, SMALLEST_STOP) >= LARGE_PX else ["too small"]),
             ]
             if route in ("/", "/fleet"):
                 found[route, size] += _covered_by_dialogs(page)
@@ -214,7 +199,7 @@ def test_without_the_server_no_stop_is_covered(show: Show) -> None:
         assert (evaluate(page, COVERED_STOPS), evaluate(page, OVERFLOW)) == ([], 0)
 
 
-def test_the_bar_of_the_past_covers_no_stop_and_no_tool_of_the_map(
+def test_the_bar_of_the_past_covers_no_stop(
     browser: Browser, past_of_ten: Site
 ) -> None:
     """A robot disobeys then, as now; nobody is told what to do about then."""
@@ -226,8 +211,6 @@ def test_the_bar_of_the_past_covers_no_stop_and_no_tool_of_the_map(
         for size in (*FEW, (768, 1024)):
             Told(page).at(size)
             assert evaluate(page, COVERED_STOPS) == []
-            page.evaluate("() => scrollTo(0, 0)")
-            assert evaluate(page, UNDER_BAR) == []
             assert evaluate(page, OVERFLOW) == 0
             expect(page.locator("#p1 .p1__line")).to_be_in_viewport(ratio=1)
 
@@ -261,22 +244,6 @@ def test_the_status_line_cuts_no_sentence_in_any_window_or_size_of_letters(
             told.page.evaluate("() => { document.adoptedStyleSheets = [] }")
 
     assert {where: found for where, found in cut.items() if found} == {}
-
-
-def test_the_status_line_shows_its_robot_on_the_map_by_tap_and_by_key(
-    show: Show,
-) -> None:
-    told = show(snapshot(2))
-    told.stage("STOP not confirmed")
-    page = told.page
-    following = page.locator("#following")
-
-    page.locator("#status").click()
-    expect(following).to_contain_text("AGI")
-    page.locator("#map-fit").click()
-    expect(following).to_be_hidden()
-    page.locator("#status").press("Enter")
-    expect(following).to_contain_text("AGI")
 
 
 # --- a finger on its way --------------------------------------------------------------
@@ -403,31 +370,6 @@ NEAREST_STOP = """() => {
   return gaps.length ? Math.min(...gaps) : 1000;
 }"""
 """The gap (px) between the STOP of all and the nearest other of the strip."""
-
-COLLISIONS = """() => {
-  const parts = [...document.querySelectorAll('.header__bar > *')]
-    .filter((part) => !part.matches('.stops, .spring') && part.checkVisibility());
-  const boxes = parts.map((part) => [part.className, part.getBoundingClientRect()]);
-  return boxes.slice(1).filter(([, box], i) => box.left < boxes[i][1].right - 1)
-    .map(([name]) => name);
-}"""
-"""Parts of the header that lie on the one before."""
-
-TAGS_ON_WORDS = """() => [...document.querySelectorAll('.card')].filter((card) => {
-  const bottom = (part) => card.querySelector(part).getBoundingClientRect().bottom;
-  const mode = card.querySelector('.card__mode').getBoundingClientRect();
-  return bottom('.link') > mode.top - 1;
-}).map((card) => card.dataset.robot)"""
-"""Cards on which the age covers what is said."""
-
-UNDER_BAR = """() => {
-  const bar = document.querySelector('#past').getBoundingClientRect();
-  return [...document.querySelectorAll('.map-tools button')]
-    .filter((one) => one.getBoundingClientRect().bottom > bar.top
-      && one.getBoundingClientRect().right > bar.left)
-    .map((one) => one.id);
-}"""
-"""Tools of the map that the bar of the past lies over."""
 
 LOW = ((568, 320), (667, 375), (768, 390), (844, 390), (932, 430), (1180, 500))
 NARROW = ((320, 568), (390, 844), (768, 1024))

@@ -1,6 +1,5 @@
 """The five widgets before the robots of ``demo --ros2``."""
 
-import re
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -9,20 +8,17 @@ from playwright.sync_api import Page, expect
 from iveg.lab.commands.demo import ros2_parts
 from tests.e2e.conftest import OpenPage
 from tests.e2e.hands import let_go
-from tests.e2e.reading import card, evaluate, number, strip_stop
+from tests.e2e.reading import (
+    HALVED,
+    STANDING,
+    card,
+    number,
+    strip_stop,
+    wait_for_paintings,
+)
 from tests.processes import Site, site, until
 
 pytestmark = [pytest.mark.e2e]
-
-NOTE_PAINTED = """() => {
-  window.painted = {};
-  window.__onPaint = ({robot, kind, stamp}) => {
-    const key = `${robot} ${kind}`;
-    (window.painted[key] ??= new Set()).add(stamp);
-  };
-}"""
-HALVED = re.compile(r"50\W?%: .*(?:persona|robot)")
-STANDING = re.compile(r"PARADO \(hace [\d,]+ s\)")
 
 
 @pytest.fixture(scope="module")
@@ -43,15 +39,13 @@ def test_over_ros_2_each_of_the_five_widgets_does_its_work(
 ) -> None:
     page = open_page()
     page.wait_for_selector('[data-robot="AGI"][data-link="LIVE"]')
-    evaluate(page, NOTE_PAINTED)
     x, y = number(page, "AGI", "x"), number(page, "AGI", "y")
 
     def moves() -> bool:
         far = abs(number(page, "AGI", "x") - x) + abs(number(page, "AGI", "y") - y)
         return far > 0.2 and number(page, "AGI", "v") > 0.05
 
-    for key in ("AGI odom", "AGI lidar", "AGII odom", "AGII lidar"):
-        page.wait_for_function("key => window.painted[key]?.size > 30", arg=key)
+    wait_for_paintings(page, "AGI", "AGII")
     until(moves, "pose and speed of AGI change")
     page.locator('#log [data-kind="speed"]', has_text=HALVED).first.wait_for()
     shoot(page, "ros2-live")
@@ -61,7 +55,4 @@ def test_over_ros_2_each_of_the_five_widgets_does_its_work(
     shoot(page, "ros2-stopped")
     let_go(page, stack, "AGI")
     until(moves, "AGI drives again")
-
-
-def test_the_logs_of_every_part_are_clean(stack: Site) -> None:
     stack.assert_clean()

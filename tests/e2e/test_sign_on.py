@@ -7,7 +7,6 @@ sites, so Strict cookies stay behind on the way from one to the other.
 import asyncio
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -23,28 +22,7 @@ from tests.fakes.identity_provider import (
     serving,
 )
 from tests.processes import Site, site
-
-
-@contextmanager
-def running(provider: FakeIdentityProvider) -> Iterator[None]:
-    """The provider in a thread of its own."""
-    loop, is_up = asyncio.new_event_loop(), threading.Event()
-
-    async def serve(done: asyncio.Event) -> None:
-        async with serving(provider):
-            is_up.set()
-            await done.wait()
-
-    done = asyncio.Event()
-    thread = threading.Thread(target=loop.run_until_complete, args=(serve(done),))
-    thread.start()
-    assert is_up.wait(30.0)
-    try:
-        yield
-    finally:
-        loop.call_soon_threadsafe(done.set)
-        thread.join(30.0)
-        loop.close()
+from tests.threads import running
 
 
 @pytest.fixture
@@ -54,8 +32,15 @@ def provider() -> Iterator[FakeIdentityProvider]:
         "ana-1": dict(KEYCLOAK),
         "eva-2": {"name": "Eva"},
     }
-    made = FakeIdentityProvider(url, people)
-    with running(made):
+    made, is_up = FakeIdentityProvider(url, people), threading.Event()
+
+    async def serve() -> None:
+        async with serving(made):
+            is_up.set()
+            await asyncio.Event().wait()
+
+    with running(serve(), "provider"):
+        assert is_up.wait(30.0)
         yield made
 
 

@@ -13,6 +13,7 @@ from tests.e2e.conftest import OpenPage, live_page
 from tests.e2e.hands import HELD_MS, begin_hold, hold, let_go, open_menu
 from tests.e2e.reading import (
     COVERED_STOPS,
+    STANDING,
     card,
     evaluate,
     number,
@@ -23,7 +24,6 @@ from tests.processes import Site, until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.full_speed]
 
-STANDING = re.compile(r"PARADO \(hace [\d,]+ s\)")
 _NOTE_WHEN = """([selector]) => {
   const control = document.querySelector(selector);
   const note = () => { window.__changedAt ??= Date.now(); };

@@ -13,13 +13,12 @@ from playwright.sync_api import Browser, Locator, Page, expect
 from tests.e2e.conftest import OpenPage, live_page
 from tests.e2e.hands import ask, begin_hold, let_go, look, open_menu
 from tests.e2e.puppet import CRUISE, Puppet, described, puppet
-from tests.e2e.reading import card, evaluate, strip_stop
+from tests.e2e.reading import STANDING, card, evaluate, strip_stop
 from tests.processes import EMULATOR, Site, site, until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
 STEPS = "asked", "acknowledged", "standing"
-STANDING = re.compile(r"PARADO \(hace [\d,]+ s\)")
 
 _WATCH = """([robot]) => {
   const control = document.querySelector(`#stops [data-stop="${robot}"]`);
@@ -40,9 +39,7 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     directory = tmp_path_factory.mktemp("stop")
     settings = {"IVEG_ROBOTS": "AGI,AGV", "IVEG_FLEET": described(directory, "AGV")}
     with site(directory, **settings) as place:
-        place.start("fiware").wait_until_ready()
-        place.start("serve")
-        place.wait_until_served()
+        place.serve()
         place.start(*EMULATOR, "--robots", "1")
         place.wait_until_live(robots=1)
         yield place
@@ -77,48 +74,26 @@ def agi(page: Page, stack: Site) -> Locator:
     return strip_stop(page, "AGI")
 
 
-@pytest.fixture
-def english(open_page: OpenPage) -> Page:
-    """The same page in English."""
-    return _listening(open_page(locale="en-GB", route="/about"))
-
-
-# --- the link ------------------------------------------------------------------------
-
-
 # --- unconfirmed ---------------------------------------------------------------------
 
 
 def test_a_lost_control_still_sends_and_says_loudly_what_nobody_confirms(
-    page: Page, agi: Locator, english: Page, stack: Site
+    page: Page, agi: Locator, stack: Site
 ) -> None:
     with stack.paused("emulator"):
         expect(agi).to_have_attribute("data-state", "lost")
         agi.click()
 
         expect(agi).to_contain_text("PARADA SIN CONFIRMAR — use la seta roja")
-        expect(strip_stop(english, "AGI")).to_contain_text(
-            "STOP NOT CONFIRMED — use the red button"
-        )
         line = page.locator("#p1 .p1__line")
         expect(line).to_contain_text(
             "AGI: PARADA SIN CONFIRMAR: use la seta roja. Estaba"
         )
-        expect(line).to_contain_text(re.compile(r"Pulsado hace \d+ s por operador"))
-        expect(line).to_contain_text(re.compile(r"Último informe hace [\d,]+ s, a"))
         expect(line).to_contain_text("Vías: directa enviada, FIWARE en curso")
-        expect(english.locator("#p1 .p1__line")).to_contain_text(
-            re.compile(r"Pressed \d+ s ago by operator, \d+ tries")
-        )
-        box = line.bounding_box()
-        assert box is not None
-        assert box["width"] > 1300
         first = _numbers(line)
         until(lambda: _numbers(line)["tries"] > first["tries"] + 1, "more tries")
         until(lambda: _numbers(line)["pressed"] > first["pressed"], "it ages")
-        later = _numbers(line)
-        assert later["pressed"] > first["pressed"]
-        assert later["heard"] > first["heard"]
+        assert _numbers(line)["heard"] > first["heard"]
 
     # L1: nobody has to do anything for the truth to come back.
     expect(agi).to_contain_text(STANDING)

@@ -26,11 +26,10 @@ def fiware(place: Site) -> Site:
 
 
 @pytest.fixture
-def served(fiware: Site) -> Site:
+def served(place: Site) -> Site:
     """FIWARE and the dashboard run; no robot yet."""
-    fiware.start("serve")
-    fiware.wait_until_served()
-    return fiware
+    place.serve()
+    return place
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 """A goal through real processes: given by API, driven to by the emulator, and told."""
 
+import math
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -13,34 +13,24 @@ from tests.processes import EMULATOR, Site, site, until
 
 pytestmark = pytest.mark.slow
 TOLD = ["log.goal.sent.here", "log.goal.accepted", "log.goal.reached"]
-THERE = {"kind": "here", "x": 10.0, "y": 7.5}
+THERE: dict[str, Any] = {"kind": "here", "x": 10.0, "y": 7.5}
 
 
 @pytest.fixture
 def driving(tmp_path: Path) -> Iterator[Site]:
     """FIWARE, dashboard and robots; orders go through Orion and the agent alone."""
     with site(tmp_path, IVEG_STOP_DIRECT="off") as place:
-        place.start("fiware").wait_until_ready()
-        place.start("serve")
-        place.wait_until_served()
+        place.serve()
         place.start(*EMULATOR, "--seed", "3", "--profile", "perfect")
         place.wait_until_live()
         place.wait_until_whole()
         yield place
 
 
-def operator(place: Site) -> httpx.Client:
-    """The page of whoever opened iVeg's link."""
-    headers = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
-    client = httpx.Client(
-        base_url=place.url, headers=headers, follow_redirects=True, timeout=PATIENCE_S
-    )
-    client.post("/signin", json=place.proof).raise_for_status()
-    return client
-
-
 def test_a_goal_is_driven_to_and_a_stop_deletes_the_next(driving: Site) -> None:
-    with closing(operator(driving)) as page:
+    own = driving.own_page
+    with httpx.Client(base_url=driving.url, headers=own, timeout=PATIENCE_S) as page:
+        page.post("/signin", json=driving.proof).raise_for_status()
 
         def robot() -> dict[str, Any]:
             return dict(page.get("/api/v1/robots/AGI").raise_for_status().json())
@@ -62,10 +52,8 @@ def test_a_goal_is_driven_to_and_a_stop_deletes_the_next(driving: Site) -> None:
 
         until(is_given, "the goal is given")
         there = until(lambda: goal_is("REACHED"), "AGI is at its goal")
-        away = (
-            (there["pose"]["x"] - 10.0) ** 2 + (there["pose"]["y"] - 7.5) ** 2
-        ) ** 0.5
-        assert away < 0.6
+        place = there["pose"]["x"], there["pose"]["y"]
+        assert math.dist(place, (THERE["x"], THERE["y"])) < 0.6
         until(lambda: told() == TOLD or None, "the log tells each step")
         counted = page.get("/api/v1/health").json()["counters"]
         assert counted["fiware.GoalAnswer"] >= 2

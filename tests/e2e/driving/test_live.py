@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.e2e.conftest import live_page
-from tests.e2e.reading import card, evaluate, number
+from tests.e2e.reading import HALVED, card, evaluate, number, wait_for_paintings
 from tests.processes import Site, until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.full_speed]
@@ -28,22 +28,8 @@ def page(browser: Browser, stack: Site) -> Iterator[Page]:
 def test_every_pose_and_scan_of_both_robots_is_painted(page: Page) -> None:
     robots = ("AGI", "AGII")
     began = {robot: _place(page, robot) for robot in robots}
-    evaluate(
-        page,
-        """() => {
-            window.painted = {};
-            window.__onPaint = ({robot, kind, stamp}) => {
-              const key = `${robot} ${kind}`;
-              (window.painted[key] ??= new Set()).add(stamp);
-            };
-        }""",
-    )
 
-    for robot in robots:
-        for kind in ("odom", "lidar"):
-            page.wait_for_function(
-                "key => window.painted[key]?.size > 30", arg=f"{robot} {kind}"
-            )
+    wait_for_paintings(page, *robots)
 
     def have_moved() -> bool:
         return all(dist(_place(page, it), began[it]) > 0.2 for it in robots)
@@ -54,8 +40,7 @@ def test_every_pose_and_scan_of_both_robots_is_painted(page: Page) -> None:
 def test_a_person_in_the_ring_halves_the_speed_and_the_log_says_why(
     page: Page, stack: Site
 ) -> None:
-    because = re.compile(r"50\W?%: .*(?:persona|robot)")
-    page.locator('#log [data-kind="speed"]', has_text=because).first.wait_for()
+    page.locator('#log [data-kind="speed"]', has_text=HALVED).first.wait_for()
     slow = page.locator('.card[data-level="caution"] [data-part="why"]').first
     expect(slow).not_to_be_empty()
     each = page.locator("#log-each")

@@ -8,7 +8,14 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.consoles import console
 from tests.e2e.conftest import OpenPage
-from tests.e2e.reading import COVERED_STOPS, OVERFLOW, evaluate, serious, visit
+from tests.e2e.reading import (
+    COVERED_STOPS,
+    OVERFLOW,
+    evaluate,
+    serious,
+    strip_stop,
+    visit,
+)
 from tests.patience import AGAIN
 from tests.processes import Site, until
 
@@ -58,6 +65,7 @@ def test_what_an_admin_sees_is_accessible_and_who_is_ended_while_watching_is_out
     chief.keyboard.press("Enter")
     chief.keyboard.press("Enter")
     expect(eva.locator("body")).to_have_attribute("data-connection", "signed-out")
+    expect(strip_stop(eva, "AGI")).to_have_attribute("data-state", "lost")
     expect(row).to_have_count(0)
     stopped = eva.context.request.post(
         f"{stack.url}/api/v1/robots/AGI/stop", headers=stack.own_page, max_retries=AGAIN
@@ -65,30 +73,22 @@ def test_what_an_admin_sees_is_accessible_and_who_is_ended_while_watching_is_out
     assert stopped.status == 401
 
 
-def test_the_link_signs_in_and_its_token_is_sent_in_no_address(
+def test_the_link_signs_in_as_earlier_ones_do_and_its_token_is_sent_in_no_address(
     stack: Site, browser: Browser
 ) -> None:
-    with closing(browser.new_context(base_url=stack.url)) as context:
-        page = context.new_page()
-        asked: list[str] = []
-        page.on("request", lambda request: asked.append(request.url))
+    token = stack.settings["IVEG_SIGN_IN_TOKEN"]
+    asked: list[str] = []
+    for link in (stack.printed_link, f"{stack.url}/?token={token}"):
+        with closing(browser.new_context()) as context:
+            page = context.new_page()
+            if link == stack.printed_link:
+                page.on("request", lambda request: asked.append(request.url))
+            page.goto(link)
+            page.wait_for_url(f"{stack.url}/")
+            expect(page.locator("#mark")).to_have_attribute("data-state", "open")
 
-        page.goto(stack.printed_link)
-        page.wait_for_url(f"{stack.url}/")
-
-        token = stack.settings["IVEG_SIGN_IN_TOKEN"]
-        assert not [url for url in asked if token in url.partition("#")[0]]
-
-
-def test_a_link_of_earlier_versions_signs_in_by_the_page(
-    stack: Site, browser: Browser
-) -> None:
-    with closing(browser.new_context(base_url=stack.url)) as context:
-        page = context.new_page()
-        page.goto(f"/?token={stack.settings['IVEG_SIGN_IN_TOKEN']}")
-
-        expect(page.locator("#mark")).to_have_attribute("data-state", "open")
-        assert page.url == f"{stack.url}/"
+    assert asked
+    assert not [url for url in asked if token in url.partition("#")[0]]
 
 
 def _begin(page: Page, stack: Site, invitation: str) -> int:
