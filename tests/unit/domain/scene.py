@@ -123,27 +123,6 @@ class Scene:
         self._apply(received(said, after=self.now))
         return self.people.witness(said, at(self.now), f"laser{self._seq}")
 
-    def report(
-        self,
-        robot_id: str,
-        *,
-        factor: float,
-        decision_id: str | None = None,
-        reason: str = "clear",
-        cause: str | None = None,
-    ) -> None:
-        """A robot says what it applies, and for which decision."""
-        self._seq += 1
-        said = safety_report(
-            robot_id,
-            speed_factor=factor,
-            reason=reason,
-            cause=cause,
-            decision_id=decision_id,
-            origin=self._origin(),
-        )
-        self._apply(received(said, after=self.now))
-
     def navigate(
         self, robot_id: str, task: str, path: tuple[tuple[float, float], ...] = ()
     ) -> None:

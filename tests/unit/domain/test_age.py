@@ -31,15 +31,12 @@ def test_what_was_heard_tells_when_it_was_composed(seq: int, moment: float) -> N
 )
 def test_what_was_never_sent_proves_nothing(echoes: tuple[FeedbackRef, ...]) -> None:
     assert ledger(10.0, 10.1, 10.2).composed_at(*echoes) is None
+    assert FeedbackLedger().composed_at(*echoes) is None
 
 
 def test_of_several_authors_ours_proves_the_age_wherever_it_stands() -> None:
     echoes = heard(9, boot="another"), heard(99), heard(5), heard(2)
     assert ledger(10.0, 10.1, 10.2).composed_at(*echoes) == 10.2
-
-
-def test_before_the_first_feedback_nothing_is_proven() -> None:
-    assert FeedbackLedger().composed_at(heard(1)) is None
 
 
 def test_moments_close_together_answer_with_the_older_one() -> None:

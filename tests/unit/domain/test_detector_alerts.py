@@ -58,9 +58,7 @@ def test_of_a_robot_that_is_silent_itself_or_just_came_back_it_is_no_news() -> N
     world = worked()
     assert [keys(world, now) for now in (2.0, 4.0)] == [[], []]
 
-    told = []
-    for now in (20.0, 20.5, 21.0, 21.5):
-        told.append(keys(driving(world, now), now))
+    told = [keys(driving(world, now), now) for now in (20.0, 20.5, 21.0, 21.5)]
 
     assert told == [[], [], [], ["alert.detector_silent"]]
 

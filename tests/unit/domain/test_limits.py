@@ -1,7 +1,6 @@
 """The safety numbers stand once; what judges by them agrees."""
 
 import json
-import re
 from dataclasses import Field, fields
 from typing import Any
 
@@ -27,14 +26,6 @@ def test_the_ring_law_gives_the_shared_cases(case: dict[str, float]) -> None:
     )
 
 
-@pytest.mark.parametrize("row", fields(LIMITS), ids=lambda row: row.name)
-def test_every_limit_has_a_unit_a_source_and_a_meaning(row: Field[Any]) -> None:
-    assert row.metadata["unit"]
-    assert row.metadata["source"]
-    assert row.metadata["says"]
-    assert getattr(LIMITS, row.name) > 0
-
-
 def test_rule_robot_and_settings_begin_with_the_limits() -> None:
     settings, robot = Settings(), Limits()
 
@@ -47,18 +38,8 @@ def test_rule_robot_and_settings_begin_with_the_limits() -> None:
 @pytest.mark.parametrize("row", fields(LIMITS), ids=lambda row: row.name)
 def test_the_safety_page_prints_the_limit(row: Field[Any]) -> None:
     page = (ROOT / "docs/safety.md").read_text()
+    assert row.default > 0
     value, facts = f"{row.default:g} {row.metadata['unit']}", row.metadata
 
     line = f"| `{row.name}` | {value} | {facts['says']} | {facts['source']} |"
     assert f"\n{line}\n" in page
-
-
-def test_no_page_writes_a_safety_number_of_its_own() -> None:
-    law = re.compile(r"\b(0\.32|1\.6)\b")
-    written = [
-        file.name
-        for file in (ROOT / "iveg/static/js").rglob("*.js")
-        if law.search(file.read_text())
-    ]
-
-    assert written == []

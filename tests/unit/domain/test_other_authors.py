@@ -1,5 +1,6 @@
 """Another server that speaks to the fleet is found in what robots echo."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
@@ -23,7 +24,6 @@ class Field:
         self,
         after: float,
         *others: tuple[str, int],
-        robot_id: str = "AGI",
         transport: TransportId = DIRECT.id,
         ours: float | None = 0.0,
     ) -> None:
@@ -36,7 +36,7 @@ class Field:
             echoes.append(FeedbackRef(OURS, max(1, round(10 * (after - ours)) + 1)))
         said = replace(origin(self.count, after=after), acknowledgements=True)
         said = replace(said, heard=echoes[0], heard_also=tuple(echoes[1:]))
-        one = odometry(robot_id, origin=said)
+        one = odometry(origin=said)
         self.world.apply(Received(one, at(after), transport))
 
     def found(self, after: float) -> list[str]:
@@ -50,54 +50,38 @@ def test_a_count_of_another_boot_that_rises_for_three_seconds_is_another_iveg() 
         assert field.found(0.1 * step) == (["other"] if step == 30 else [])
 
 
-def test_an_earlier_boot_of_ours_says_nothing_more_and_is_none() -> None:
-    field = Field()
-    for step in range(200):
-        field.say(0.1 * step, ("before", 900))
-        assert field.found(0.1 * step) == []
-
-
-def test_a_count_of_our_own_boot_that_we_never_sent_is_another_iveg() -> None:
-    field = Field()
-    for step in range(40):
-        field.say(0.1 * step, (OURS, 10**9 + step))
-    assert field.found(3.9) == [OURS]
-
-
-def test_a_second_count_in_our_own_name_that_rises_is_another_iveg() -> None:
-    field = Field()
-    for step in range(60):
-        field.say(0.1 * step, (OURS, max(1, step - 9)))
-    assert field.found(5.9) == [OURS]
-
-
-def test_what_fiware_brings_from_before_our_start_is_no_news_of_anybody() -> None:
-    field = Field()
-    for step in range(60):
-        field.say(0.1 * step, ("before", step), transport=FIWARE.id, ours=None)
-    assert field.found(5.9) == []
-
-
-def test_by_fiware_alone_whoever_speaks_beside_us_is_found() -> None:
-    field = Field()
-    for step in range(10, 60):
-        field.say(0.1 * step, ("other", step), transport=FIWARE.id, ours=1.0)
-    assert field.found(5.9) == ["other"]
-
-
-@pytest.mark.parametrize(("after", "found"), [(13.9, ["other"]), (14.1, [])])
-def test_it_is_over_ten_seconds_after_its_last_word(
-    after: float, found: list[str]
+@pytest.mark.parametrize(
+    ("author", "seqs", "found"),
+    [
+        ("before", [900] * 200, []),
+        (OURS, range(10**9, 10**9 + 40), [OURS]),
+        (OURS, [max(1, step - 9) for step in range(60)], [OURS]),
+    ],
+    ids=["an earlier boot", "what we never sent", "a second count that rises"],
+)
+def test_a_count_that_rises_in_our_own_name_is_another_iveg_and_one_that_stands_none(
+    author: str, seqs: Sequence[int], found: list[str]
 ) -> None:
     field = Field()
-    for step in range(40):
-        field.say(0.1 * step, ("other", step))
-    assert field.found(after) == found
+    for step, seq in enumerate(seqs):
+        field.say(0.1 * step, (author, seq))
+    assert field.found(0.1 * len(seqs) - 0.1) == found
 
 
-def test_it_is_over_at_once_when_robots_have_forgotten_it() -> None:
+@pytest.mark.parametrize(("ours", "found"), [(None, []), (1.0, ["other"])])
+def test_by_fiware_alone_who_speaks_beside_us_is_found_and_who_spoke_before_is_not(
+    ours: float | None, found: list[str]
+) -> None:
+    field = Field()
+    for step in range(10, 60):
+        field.say(0.1 * step, ("other", step), transport=FIWARE.id, ours=ours)
+    assert field.found(5.9) == found
+
+
+def test_it_is_over_ten_seconds_after_its_last_word_or_once_robots_forgot_it() -> None:
     field = Field()
     for step in range(40):
         field.say(0.1 * step, ("other", step))
+    assert [field.found(after) for after in (13.9, 14.1)] == [["other"], []]
     field.say(4.0)
     assert field.found(4.0) == []

@@ -7,7 +7,7 @@ import pytest
 
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import LaserScan
-from iveg.domain.peer_scan import BEAMS, PeerScan, peer_scan_of
+from iveg.domain.peer_scan import BEAMS, peer_scan_of
 from tests.builders import scan
 
 HERE = Pose2D(3.0, 4.0, 0.7)
@@ -24,10 +24,6 @@ def all_round(ranges: list[float], *, clockwise: bool = False) -> LaserScan:
     )
 
 
-def told(one: LaserScan) -> PeerScan:
-    return peer_scan_of(one, HERE, 0.1)
-
-
 @pytest.mark.parametrize("clockwise", [False, True])
 @pytest.mark.parametrize("rays", [40, 72, 360, 720, 1081, 4096])
 def test_a_thing_stays_where_the_laser_met_it(rays: int, *, clockwise: bool) -> None:
@@ -35,29 +31,24 @@ def test_a_thing_stays_where_the_laser_met_it(rays: int, *, clockwise: bool) -> 
     ranges[rays // 3] = 5.0
     one = all_round(ranges, clockwise=clockwise)
 
-    found = told(one).returns()
+    found = peer_scan_of(one, HERE, 0.1).returns()
 
     (true,) = one.points(HERE)
     nearest = np.hypot(*(found - true).T)
     assert nearest.min() <= 0.05 + 5.0 * math.tau / rays / 2 * (rays < BEAMS)
 
 
-def test_a_beam_is_as_long_as_its_shortest_ray() -> None:
-    ranges = [9.0] * 720
-    ranges[33] = 2.0
+@pytest.mark.parametrize(
+    ("ray", "others", "told_as"),
+    [(2.0, 9.0, 2.0), (0.05, math.inf, 0.0), (math.nan, math.inf, 0.0)],
+)
+def test_a_beam_says_as_little_as_the_ray_of_it_that_says_least(
+    ray: float, others: float, told_as: float
+) -> None:
+    ranges = [others] * 720
+    ranges[33] = ray
 
-    found = told(all_round(ranges)).ranges
+    found = peer_scan_of(all_round(ranges), HERE, 0.1).ranges
 
-    assert found[3] == pytest.approx(2.0, abs=0.011)
-    assert np.delete(found, [2, 3, 4]).min() == pytest.approx(9.0, abs=0.011)
-
-
-@pytest.mark.parametrize("nothing", [0.05, 0.0, math.nan, -math.inf])
-def test_a_beam_with_a_ray_that_says_nothing_says_nothing(nothing: float) -> None:
-    ranges = [math.inf] * 720
-    ranges[33] = nothing
-
-    found = told(all_round(ranges)).ranges
-
-    assert found[3] == 0.0
-    assert np.isinf(np.delete(found, [2, 3, 4])).all()
+    assert found[3] == pytest.approx(told_as, abs=0.011)
+    assert np.delete(found, [2, 3, 4]).min() == pytest.approx(others, abs=0.011)

@@ -20,11 +20,8 @@ def test_where_every_day_was_recorded_horizons_are_those_of_the_calendar() -> No
     }
 
 
-def test_what_is_kept_for_ever_has_no_moment() -> None:
+def test_what_is_kept_for_ever_or_was_never_written_has_no_moment() -> None:
     assert Retention(0, 0, 0, 0).cutoffs(NOW, EVERY_DAY) == {}
-
-
-def test_a_history_without_a_line_lets_nothing_go() -> None:
     assert Retention().cutoffs(NOW, ()) == {}
 
 
@@ -35,11 +32,3 @@ def test_a_clock_that_is_years_ahead_takes_three_days_and_no_more(years: int) ->
 
     assert cutoff(7, ahead * DAY_S + 1.0, recorded) == (TODAY - 3) * DAY_S
     assert cutoff(365, ahead * DAY_S + 1.0, recorded) == (TODAY - 361) * DAY_S
-
-
-def test_a_clock_that_began_in_1970_takes_three_days_of_those_rows() -> None:
-    recorded = [TODAY, TODAY - 1, 0]
-
-    assert cutoff(5, NOW, recorded) == 0.0
-    assert cutoff(4, NOW, recorded) == DAY_S
-    assert cutoff(2, NOW, recorded[:2]) == NOW - 2 * DAY_S

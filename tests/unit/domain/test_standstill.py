@@ -55,30 +55,28 @@ def moving(rest: Standstill, *moments: float, late: float = 0.0) -> list[bool | 
 # --- the rest ---------------------------------------------------------------------
 
 
-def test_reports_that_come_all_at_once_tell_the_rest_that_they_measured() -> None:
+@pytest.mark.parametrize(
+    ("measured", "every_s", "found"),
+    [
+        ([10.0 + s for s in SECONDS], 0.0, [False] * 5 + [True]),
+        (
+            [10.0, 10.2, 10.4, 11.0, 11.2, 11.4, 11.6, 11.8, 12.0],
+            0.2,
+            [False] * 8 + [True],
+        ),
+        ([5.0] * 3, 0.5, [False] * 3),
+    ],
+    ids=["come all at once", "a gap in what was measured", "moments do not rise"],
+)
+def test_a_rest_is_what_was_measured_whenever_it_comes(
+    measured: list[float], every_s: float, found: list[bool]
+) -> None:
     rest = Standstill()
 
-    found = [rest.rested(at(30.0), said(10.0 + s)) for s in SECONDS]
-
-    assert found == [False] * 5 + [True]
-
-
-def test_a_gap_in_what_was_measured_begins_anew_though_none_was_in_arrival() -> None:
-    rest = Standstill()
-    measured = [10.0, 10.2, 10.4, 11.0, 11.2, 11.4, 11.6, 11.8, 12.0]
-
-    found = [rest.rested(at(0.2 * n), said(mono)) for n, mono in enumerate(measured)]
-
-    assert found == [False] * 8 + [True]
-
-
-def test_moments_that_do_not_rise_prove_no_rest() -> None:
-    rest = Standstill()
-    stuck = [Origin("a", seq, mono=5.0) for seq in range(3)]
-
-    found = [rest.rested(at(0.5 * n), one) for n, one in enumerate(stuck)]
-
-    assert found == [False] * 3
+    assert found == [
+        rest.rested(at(30.0 + every_s * n), Origin("a", n, mono=mono))
+        for n, mono in enumerate(measured)
+    ]
 
 
 def test_a_clock_that_is_set_back_does_not_hide_a_rest_for_long() -> None:

@@ -17,16 +17,13 @@ def full() -> Scene:
     return scene
 
 
-def test_whoever_has_a_ring_stays_when_more_come() -> None:
+def test_whoever_has_a_ring_stays_when_more_come_and_is_seen_again() -> None:
     scene = full()
     known = [one.person_id for one in scene.everyone]
     crowd(scene, 40, first=MAX_PEOPLE)
     assert [one.person_id for one in scene.everyone] == known
     assert scene.people.turned_away == 40
 
-
-def test_somebody_known_is_seen_again_in_a_full_greenhouse() -> None:
-    scene = full()
     scene.now = 0.5
     (placed,) = scene.look("AGI", person(0.2, 0.0))
     assert placed.person is not None

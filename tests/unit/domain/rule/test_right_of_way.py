@@ -43,20 +43,19 @@ def test_the_lesser_task_slows_early_and_the_greater_as_today() -> None:
 
 
 @pytest.mark.parametrize(
-    ("agi", "agii"),
-    [("scouting", "watching"), ("sowing", "hauling"), (None, "hauling")],
-    ids=["equal", "unknown", "none"],
+    ("agi", "agii", "is_old", "somebody"),
+    [
+        ("scouting", "watching", False, False),
+        ("sowing", "hauling", False, False),
+        (None, "hauling", False, False),
+        ("scouting", "hauling", True, False),
+        ("scouting", "hauling", False, True),
+    ],
+    ids=["equal", "unknown", "none", "told long ago", "near a person"],
 )
-def test_without_a_lesser_task_today_s_rule_stays(
-    agi: str | None, agii: str | None
+def test_without_a_lesser_task_of_now_and_near_people_today_s_rule_stays(
+    agi: str | None, agii: str | None, *, is_old: bool, somebody: bool
 ) -> None:
-    assert first_slow(agi, agii) == first_slow(None, None)
+    found = first_slow(agi, agii, is_old=is_old, somebody=somebody)
 
-
-def test_an_old_task_gives_no_right() -> None:
-    assert first_slow("scouting", "hauling", is_old=True) == first_slow(None, None)
-
-
-def test_near_a_person_tasks_decide_nothing() -> None:
-    with_tasks = first_slow("scouting", "hauling", somebody=True)
-    assert with_tasks == first_slow(None, None, somebody=True)
+    assert found == first_slow(None, None, somebody=somebody)

@@ -1,13 +1,14 @@
 """A camera that reports nobody where another one surely sees somebody is named."""
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from iveg.domain import alerts
 from iveg.domain.detector import OutOfService
 from iveg.domain.geometry import Rectangle
-from iveg.domain.greenhouse import PlacedObstacle
+from iveg.domain.greenhouse import Greenhouse, PlacedObstacle
 from iveg.domain.observations import Detection
 from tests.builders import at
 from tests.unit.domain.scene import FIELD, HEDGE, Scene, person
@@ -36,8 +37,8 @@ def watch(
     return scene
 
 
-def fleet(**parts: object) -> Scene:
-    return Scene(robots=("AGI", "AGII", "AG3"), **parts)  # type: ignore[arg-type]
+def fleet(greenhouse: Greenhouse = FIELD) -> Scene:
+    return Scene(("AGI", "AGII", "AG3"), greenhouse)
 
 
 def blind_by(scene: Scene) -> str | None:
@@ -71,8 +72,11 @@ def test_it_stands_after_they_are_gone_until_the_camera_shows_somebody_again() -
     assert not scene.world.robot("AGI").detector.is_missing(at(scene.now))
 
 
-def test_a_blind_camera_ends_no_zone_of_its_own() -> None:
-    scene = watch(fleet(), 5.2)
+def test_a_blind_camera_that_shows_somebody_elsewhere_is_blind_and_ends_no_zone() -> (
+    None
+):
+    scene = watch(fleet(), 5.2, person(2.0, 1.0))
+    assert blind_by(scene) == "AGII"
     scene.look("AGI", person(3.0, 1.2))
     watch(scene, 4.0)
 
@@ -80,34 +84,25 @@ def test_a_blind_camera_ends_no_zone_of_its_own() -> None:
     assert scene.ended == []
 
 
-def test_somebody_shown_elsewhere_proves_no_camera_whole() -> None:
-    assert blind_by(watch(fleet(), 5.2, person(2.0, 1.0))) == "AGII"
+CRATES = PlacedObstacle("crates", Rectangle(2.0, -0.3, 2.5, 0.3))
 
 
 @pytest.mark.parametrize(
-    "scene",
+    ("greenhouse", "watched"),
     [
-        fleet(greenhouse=HEDGE),
-        fleet(
-            greenhouse=replace(
-                FIELD,
-                obstacles=(PlacedObstacle("crates", Rectangle(2.0, -0.3, 2.5, 0.3)),),
-            )
-        ),
+        (HEDGE, {}),
+        (replace(FIELD, obstacles=(CRATES,)), {}),
+        (FIELD, {"peer": (2.0, 0.0)}),
+        (FIELD, {"yaw": 2.0}),
+        (FIELD, {"seen": ()}),
+        (FIELD, {"seen": (person(SPOT, probability=0.7),)}),
     ],
+    ids=["crop", "crates", "a peer", "out of view", "nobody", "not surely seen"],
 )
-def test_who_stands_behind_crop_or_crates_blinds_nobody(scene: Scene) -> None:
-    assert blind_by(watch(scene, 8.0)) is None
-
-
-def test_who_stands_behind_a_peer_or_out_of_view_blinds_nobody() -> None:
-    assert blind_by(watch(fleet(), 8.0, peer=(2.0, 0.0))) is None
-    assert blind_by(watch(fleet(), 8.0, yaw=2.0)) is None
-
-
-@pytest.mark.parametrize("seen", [(), (person(SPOT, probability=0.7),)])
-def test_who_is_not_surely_seen_blinds_nobody(seen: tuple[Detection, ...]) -> None:
-    assert blind_by(watch(fleet(), 8.0, seen=seen)) is None
+def test_who_stands_behind_something_or_is_not_surely_seen_blinds_nobody(
+    greenhouse: Greenhouse, watched: dict[str, Any]
+) -> None:
+    assert blind_by(watch(fleet(greenhouse), 8.0, **watched)) is None
 
 
 def test_a_robot_that_contradicts_itself_names_nobody_blind() -> None:
