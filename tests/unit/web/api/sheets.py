@@ -41,7 +41,7 @@ async def reader(
     app = FastAPI()
     install(app)
     app.state.authenticator = authenticator(now)
-    pages = Pages(Site("house", ("AGI",), "1", demo=False), lambda: True)
+    pages = Pages(Site("house", ("AGI",), "1", demo=False))
     app.include_router(routes(pages, now))
     cookie = app.state.authenticator.sessions.open("ana", "viewer")
     async with httpx.AsyncClient(
