@@ -28,10 +28,7 @@ _STATIC = Path(__file__).with_name("static")
 
 def create_app(dss: Dss) -> FastAPI:
     """The web side of a DSS; its lifespan runs the rest."""
-    # Whoever has the link needs no admin.
-    pages = drawing.Pages(
-        dss.web.site, lambda: dss.web.site.link or dss.accounts.people.is_led()
-    )
+    pages = drawing.Pages(dss.web.site)
     app = build_app(
         dss.web,
         pages,
@@ -89,8 +86,6 @@ def _past_routers(dss: Dss, pages: drawing.Pages) -> Iterator[APIRouter]:
         )
     )
     yield alerts.notes_router(queries, dss.core.event_log.log, clock)
-    if dss.sign_in_token:
-        yield account.sign_in_code_router(dss.sign_in_token)
     yield account.router(dss.accounts.people)
     yield account.sessions_router()
     yield account.users_router(dss.accounts.people)

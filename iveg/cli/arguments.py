@@ -93,21 +93,14 @@ def add_user(user: argparse.ArgumentParser) -> None:
     actions.add_parser("list", help="names, roles and states")
     for action, says in {
         "add": "a person, with a link that works once",
-        "role": "give another role; they sign in anew",
         "reset": "take the password away, and print a new link",
         "disable": "sign them out everywhere, for good",
-        "token": "a program's token, printed once",
-        "revoke": "end a program's token",
     }.items():
         words = actions.add_parser(action, help=says)
         words.add_argument("name", metavar="NAME")
-        if action in ("add", "role"):
+        if action == "add":
             roles = ("viewer", "operator", "admin")
             words.add_argument("--role", choices=roles, required=True)
-        if action == "token":
-            scopes = ("read", "stop", "operate")
-            words.add_argument("--scope", choices=scopes, required=True)
-        if action in ("add", "token"):
             ends = "how long it is good for"
             words.add_argument("--days", type=int, metavar="N", help=ends)
 

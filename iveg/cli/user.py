@@ -3,7 +3,6 @@
 import argparse
 from collections.abc import Iterable
 from contextlib import suppress
-from typing import TypeVar
 
 from iveg.adapters import clock
 from iveg.adapters.access_file import AccessFile
@@ -14,14 +13,12 @@ from iveg.adapters.history.queries import earlier_access
 from iveg.app.outside import ACCOUNTS, files_of
 from iveg.cli.arguments import CommandCall
 from iveg.cli.running import page_address
-from iveg.domain.accounts import AccessBook, Account, ApiToken, find_named, name_key
+from iveg.domain.accounts import AccessBook, Account, find_named, name_key
 from iveg.domain.audit import CONSOLE
 from iveg.domain.errors import NameTakenError, UnknownNameError
 from iveg.domain.retention import DAY_S
 from iveg.domain.stamps import format_stamp
 from iveg.settings import Settings
-
-_Row = TypeVar("_Row", Account, ApiToken)
 
 
 def run(call: CommandCall) -> int:
@@ -59,44 +56,23 @@ def _act(options: argparse.Namespace, settings: Settings, book: AccessBook) -> s
     """One action on accounts; returns what is to be printed."""
     now = clock.wall()
     admission = Admission(book, CONSOLE, now)
-    match options.action:
-        case "token":
-            made = (options.name, options.scope, _end(options, now))
-            return admission.give_token(*made)[0]
-        case "revoke":
-            admission.revoke(_find(book.tokens.values(), "token", options.name))
-            return f"{options.name} is out within a second."
-        case "list":
-            people, programs = book.accounts.values(), book.tokens.values()
-            return "\n".join((*_lines(people), *_programs(programs)))
-        case "add":
-            invited = (options.name, options.role, _end(options, now))
-            return _invited(settings, admission.add(*invited)[0])
-    found = _find(book.accounts.values(), "account", options.name)
-    match options.action:
-        case "reset":
-            return _invited(settings, admission.reset(found)[0])
-        case "role":
-            changed = admission.give_role(found, options.role)
-            return f"{changed.name} is {changed.role}, and signs in anew."
+    if options.action == "list":
+        return "\n".join(_lines(book.accounts.values(), now))
+    if options.action == "add":
+        ends_at = now + options.days * DAY_S if options.days else None
+        invitation, _ = admission.add(options.name, options.role, ends_at)
+        return _invited(settings, invitation)
+    found = find_named(book.accounts.values(), options.name)
+    if found is None:
+        raise UnknownNameError("account", options.name)
+    if options.action == "reset":
+        return _invited(settings, admission.reset(found)[0])
     return f"{admission.disable(found).name} is out within a second."
-
-
-def _end(options: argparse.Namespace, now: float) -> float | None:
-    """When what is made ends by itself (Unix s); None: never."""
-    return now + options.days * DAY_S if options.days else None
 
 
 def invitation_link(settings: Settings, invitation: str) -> str:
     """Address of the page that asks for a password."""
     return f"{page_address(settings)}/signin#invitation={invitation}"
-
-
-def _find(known: Iterable[_Row], kind: str, name: str) -> _Row:
-    found = find_named(known, name)
-    if found is None:
-        raise UnknownNameError(kind, name)
-    return found
 
 
 def _invited(settings: Settings, invitation: str) -> str:
@@ -106,21 +82,9 @@ def _invited(settings: Settings, invitation: str) -> str:
     return f"Their link, which works once and for 3 days:\n{link}"
 
 
-def _lines(accounts: Iterable[Account]) -> Iterable[str]:
-    now = clock.wall()
+def _lines(accounts: Iterable[Account], now: float) -> Iterable[str]:
     for account in sorted(accounts, key=lambda account: name_key(account.name)):
-        yield f"{account.name}  {account.role}  {_state(account, now)}"
-
-
-def _programs(tokens: Iterable[ApiToken]) -> Iterable[str]:
-    for token in sorted(tokens, key=lambda token: name_key(token.name)):
-        used = "never used" if token.used_at is None else format_stamp(token.used_at)
-        ends = "" if token.ends_at is None else f", ends {format_stamp(token.ends_at)}"
-        yield f"{token.name}  program  {token.scope}  {used}{ends}"
-
-
-def _state(account: Account, now: float) -> str:
-    state = account.state(now)
-    if account.ends_at is None or state == "disabled":
-        return state
-    return f"{state}, ends {format_stamp(account.ends_at)}"
+        state, ends = account.state(now), ""
+        if account.ends_at is not None and state != "disabled":
+            ends = f", ends {format_stamp(account.ends_at)}"
+        yield f"{account.name}  {account.role}  {state}{ends}"

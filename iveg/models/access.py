@@ -18,14 +18,10 @@ SessionKind = Literal["link", "account"]
 
 
 class SignInCode(Model):
-    """The sign-in link, and its QR code as a data address of an image.
-
-    ``GET /sign-in-code``: the way in for another device; of an
-    [Invitation](#invitation) for another person.
+    """The link of an [Invitation](#invitation), and its QR code.
 
     Attributes:
-        link: Signs a browser in as operator until the next start; of an invitation:
-            begins the account, once.
+        link: Begins the account, once.
         image: Its QR code as a data address.
     """
 

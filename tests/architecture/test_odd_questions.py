@@ -72,7 +72,7 @@ async def test_no_value_of_a_parameter_makes_the_server_fail(
 async def test_no_header_makes_the_server_fail(
     operator: httpx.AsyncClient, headers: dict[str, str]
 ) -> None:
-    for path in ("/", "/signin", "/api/v1/robots", "/api/v1/sign-in-code"):
+    for path in ("/", "/signin", "/api/v1/robots", "/api/v1/users"):
         assert (await operator.get(path, headers=headers)).status_code < 500
     press = await operator.post("/api/v1/fleet/stop", headers={"X-IVEG": "1"} | headers)
     assert press.status_code < 500

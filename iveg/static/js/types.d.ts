@@ -850,7 +850,7 @@ export type Server = {
   wall: number;
 };
 
-/** The sign-in link, and its QR code as a data address of an image. */
+/** The link of an [Invitation](#invitation), and its QR code. */
 export type SignInCode = {
   link: string;
   image: string;

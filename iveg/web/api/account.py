@@ -142,22 +142,6 @@ def router(people: People) -> APIRouter:
     return routes
 
 
-def sign_in_code_router(token: str) -> APIRouter:
-    """One route; ``token`` is the link's."""
-    routes = APIRouter(prefix="/api/v1", tags=["sign-in"])
-
-    @routes.get(
-        "/sign-in-code",
-        response_model=SignInCode,
-        dependencies=[Depends(require("release"))],
-    )
-    async def code(request: Request) -> Response:
-        """The link at the address by which this browser has reached iVeg."""
-        return Json(code_of(request, f"token={token}"))
-
-    return routes
-
-
 def code_of(request: Request, proof: str) -> SignInCode:
     """A link to sign in by, at the address by which this browser has reached iVeg."""
     link = f"{str(request.base_url).rstrip('/')}/signin#{proof}"

@@ -61,7 +61,6 @@ class PageFrame:
         name: Who is signed in; None shows neither navigation nor STOP.
         role: ``viewer``, ``operator``, ``admin`` or ``program``.
         account: Whether they have one of their own.
-        unready: Nobody can sign in as admin yet.
     """
 
     site: Site
@@ -70,4 +69,3 @@ class PageFrame:
     name: str | None = None
     role: str | None = None
     account: bool = False
-    unready: bool = False

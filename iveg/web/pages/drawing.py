@@ -1,7 +1,7 @@
 """Draws pages: a context by its template, in the reader's language."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import datetime
 from importlib.resources import files
@@ -102,12 +102,10 @@ class Pages:
 
     Args:
         site: What every page of this server has in common.
-        is_ready: Whether somebody can see to who comes in; each page says where not.
     """
 
-    def __init__(self, site: Site, is_ready: Callable[[], bool]) -> None:
+    def __init__(self, site: Site) -> None:
         self._site = site
-        self._is_ready = is_ready
         self._environments = {
             language: environment_of(read_sentences(language)) for language in LANGUAGES
         }
@@ -123,7 +121,6 @@ class Pages:
             visitor.name if visitor else None,
             visitor.role if visitor else None,
             account=visitor is not None and visitor.has_account,
-            unready=not self._is_ready(),
         )
 
     def draw(self, frame: PageFrame, code: int = 200, **added: object) -> HTMLResponse:

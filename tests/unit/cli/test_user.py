@@ -19,7 +19,6 @@ from iveg.domain.errors import (
     SignOnError,
     UnknownNameError,
 )
-from iveg.domain.stamps import format_stamp
 from iveg.settings import Settings
 from tests.databases import lay_history
 
@@ -114,21 +113,20 @@ def test_whom_a_provider_vouches_for_is_kept_by_id_and_shut_out_from_here() -> N
     assert admission.vouched(reserved).name == "Console 9z8y7x"
 
 
-def test_reset_role_and_disable_end_sessions(
+def test_reset_and_disable_end_sessions(
     console: Console, capsys: pytest.CaptureFixture[str]
 ) -> None:
     console.call("add", "Ana")
     began = clock.wall()
-    for action in ("reset", "role", "disable"):
-        console.call(action, "ANA", role="viewer")
+    for action in ("reset", "disable"):
+        console.call(action, "ANA")
 
     account = console.one("Ana")
     assert account.since >= began
-    assert (account.role, account.disabled, account.password) == ("viewer", True, "")
+    assert (account.disabled, account.password) == (True, "")
     assert console.left == [
         "account_added",
         "account_reset",
-        "account_role",
         "account_disabled",
     ]
 
@@ -153,29 +151,10 @@ def test_nobody_is_called_as_nobody_can_be_or_as_the_record_calls_others(
 ) -> None:
     with pytest.raises(NotANameError):
         console.call("add", name)
-    with pytest.raises(NotANameError):
-        console.call("token", name, scope="read")
 
     assert console.left == []
 
 
-def test_a_programs_token_is_printed_once_listed_and_revoked(
-    console: Console, capsys: pytest.CaptureFixture[str]
-) -> None:
-    console.call("token", "MES", scope="stop", days=2)
-    token = capsys.readouterr().out.strip()
-    (kept,) = console.book.tokens.values()
-    console.call("list")
-    listed = capsys.readouterr().out
-    console.call("revoke", "mes")
-
-    assert (kept.name, kept.scope, kept.digest) == ("MES", "stop", digest_of(token))
-    used, ends = listed.splitlines()[-1].split(", ends ")
-    assert used == "MES  program  stop  never used"
-    assert kept.ends_at == kept.made_at + 2 * 86_400.0
-    assert ends == format_stamp(kept.ends_at)
-    assert token not in listed
-    assert console.book.tokens == {}
+def test_nobody_of_an_unknown_name_is_disabled(console: Console) -> None:
     with pytest.raises(UnknownNameError):
-        console.call("revoke", "MES")
-    assert console.left == ["token_added", "token_revoked"]
+        console.call("disable", "Eva")

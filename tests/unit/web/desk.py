@@ -42,7 +42,7 @@ TENANT = {"Fiware-Service": "agroconnect", "Fiware-ServicePath": "/greenhouse"}
 
 @cache
 def _pages(site: Site) -> Pages:
-    return Pages(site, lambda: True)
+    return Pages(site)
 
 
 class WebDesk(Desk):

@@ -10,7 +10,6 @@ import { createGuard } from "./guard.js";
 import { readParameters, valueSaid } from "./parameters.js";
 import { createRuleForm } from "./rule.js";
 import { openSections } from "./sections.js";
-import { createSignInCode } from "./sign_in_code.js";
 import { startTrial } from "./trial.js";
 
 /** @typedef {import("../core/protocol.js").Rule} Rule */
@@ -26,8 +25,6 @@ export function start({ store, i18n, tone, wake, installing }) {
   const rule = createRuleForm(store, i18n, guard, parameters);
   const forms = [rule, createClassForm(store, i18n, guard)];
   startTrial(store, i18n, rule.values, parameters);
-  // Without a link there is no code of it.
-  if (document.querySelector("#code-show")) createSignInCode(i18n);
   addEventListener("beforeunload", (event) => {
     // The browser asks, with its own text, before typed values are lost.
     if (forms.some((form) => form.isDirty())) event.preventDefault();

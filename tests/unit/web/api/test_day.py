@@ -60,7 +60,7 @@ async def browser(url: str) -> AsyncIterator[Client]:
     async def read(wanted: date, now: float) -> Day:
         return await FakeWorker().run(day.read_day, url, GREENHOUSE, wanted, now)
 
-    pages = Pages(Site("house", ("AGI",), "1", demo=False), lambda: True)
+    pages = Pages(Site("house", ("AGI",), "1", demo=False))
     app = FastAPI()
     app.dependency_overrides[require("read")] = lambda: None
     app.include_router(day.router(read, pages, lambda: Instant(0.0, MORNING + 3600.0)))

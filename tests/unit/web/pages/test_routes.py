@@ -61,7 +61,7 @@ def authenticator() -> FakeAuthenticator:
 
 @pytest.fixture
 async def browser(authenticator: FakeAuthenticator) -> AsyncIterator[Client]:
-    pages = Pages(SITE, lambda: True)
+    pages = Pages(SITE)
     app = FastAPI(docs_url=None, redoc_url=None)
     app.state.authenticator = authenticator
     app.include_router(

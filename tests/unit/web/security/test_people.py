@@ -218,31 +218,6 @@ async def test_signing_in_anew_ends_the_session_before(
 
 
 @pytest.mark.parametrize(
-    ("chief", "is_said"), [(CHIEF, False), (replace(CHIEF, disabled=True), True)]
-)
-async def test_until_somebody_is_admin_every_page_says_so_and_a_program_stops(
-    desk: PeoplesDesk,
-    monkeypatch: pytest.MonkeyPatch,
-    chief: Account,
-    *,
-    is_said: bool,
-) -> None:
-    monkeypatch.setattr(desk.pages, "_is_ready", desk.people.is_led)
-    desk.book.accounts["P9"] = chief
-    html = {"Accept": "text/html"}
-    async with desk.page() as page, desk.program() as program:
-        strangers = [await page.get(one, headers=html) for one in ("/", "/signin")]
-        await enter(page, name=ANA.name, password="acelga-1234")
-        own = [await page.get(one, headers=html) for one in ("/", "/users", "/none")]
-        stopped = await program.post("/api/v1/robots/AGI/stop")
-
-    shown = [*strangers, *own]
-    assert [one.status_code for one in shown] == [401, 200, 200, 403, 404]
-    assert ['id="unready"' in one.text for one in shown] == [is_said] * 5
-    assert stopped.status_code == 202
-
-
-@pytest.mark.parametrize(
     ("token", "statuses"),
     [
         ("read", [200, 403, 403]),

@@ -47,7 +47,7 @@ class SignOnDesk(WebDesk):
             OpenIdProvider(client), reading, self.authenticator, LASTS_S
         )
         site = Site("field", ("AGI", "AGII"), "1", demo=False, sso="Cooperativa")
-        pages = Pages(site, lambda: True)
+        pages = Pages(site)
         self.app.include_router(
             router(pages, rule=lambda: self.rules.current, sign_on=self.sign_on)
         )
