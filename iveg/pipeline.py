@@ -12,7 +12,6 @@ from iveg.comfort.equipment import PART as EQUIPMENT
 from iveg.comfort.equipment import EquipmentMonitor
 from iveg.comfort.goals import GoalDispatcher
 from iveg.comfort.maps import CoverageMonitor, Mapper, PeerScans
-from iveg.comfort.margins import NewestMargins
 from iveg.comfort.trials import Trials
 from iveg.domain.equipment import Equipment, Tile
 from iveg.domain.events import LogEvent
@@ -90,7 +89,6 @@ class Pipeline:
             decided=latency.decided,
             ticked=latency.tick,
         )
-        supervision.listen("margins", ticked=NewestMargins(core).tick)
         supervision.listen(EQUIPMENT, entity_read=self.equipment.receive)
         self.trials = Trials(core, self.evaluator, self.rules)
 

@@ -272,14 +272,6 @@ class OdometryRecord:
         float | None, Means("Factor that the robot reports.", "0 to 1")
     ] = None
     link: Annotated[str | None, Means("Its link: `LIVE`, `LATE` or `LOST`.")] = None
-    margin_m: Annotated[
-        float | None,
-        Means(
-            "Least margin to anybody seen, a second old at most; none: unknown, nobody "
-            "is seen, or it stands.",
-            "m",
-        ),
-    ] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

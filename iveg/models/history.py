@@ -127,10 +127,7 @@ class AuditEntry(Row):
 
 @row_of(OdometryRecord)
 class OdometryRow(Row):
-    """Pose in ``map`` (m, rad), speed (m/s, rad/s), speed limit, margin of a robot.
-
-    The margin is that of [safety.md](../safety.md#margins).
-    """
+    """Pose in ``map`` (m, rad), speed (m/s, rad/s) and speed limit of a robot."""
 
 
 @row_of(ReadingRecord)

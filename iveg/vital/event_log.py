@@ -5,7 +5,7 @@ API and the database agree.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import fields, replace
 from functools import partial, wraps
 from typing import Concatenate, ParamSpec
@@ -70,14 +70,12 @@ class EventLog:
 
     Attributes:
         lines: The newest log lines, oldest first.
-        margins: The newest margin of each robot (m), which its pose is kept with.
     """
 
     def __init__(
         self, sink: RecordSink, start: Instant, supervision: Supervision
     ) -> None:
         self.supervision = supervision
-        self.margins: Mapping[str, float | None] = {}
         self._sink = sink
         self._told: dict[str, tuple[float, float | None, str]] = {}
         """Limit, applied factor and link that a robot's pose was last kept with."""
@@ -175,7 +173,6 @@ class EventLog:
                 limit_factor=limit,
                 applied_factor=applied,
                 link=link,
-                margin_m=self.margins.get(robot_id),
             )
         )
 

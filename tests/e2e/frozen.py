@@ -191,10 +191,6 @@ def _history() -> Iterator[Record]:
                 robot_id=robot,
                 linear=speed * slow,
                 limit_factor=slow,
-                # Somebody is in sight at the time of the decision, with a gap.
-                margin_m=abs(n - 360) / 30 - 0.8
-                if robot == "AGII" and 290 <= n < 430 and not 380 <= n < 396
-                else None,
             )
     for n in range(1440):
         at = NOW - 60 * (1440 - n)

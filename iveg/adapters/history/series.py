@@ -56,7 +56,7 @@ class Charted:
 SPEEDS = Charted(
     odometry,
     ("robot_id",),
-    {"linear": func.avg, "limit_factor": func.min, "margin_m": func.min},
+    {"linear": func.avg, "limit_factor": func.min},
     2000,
     ODOMETRY_PERIOD_S,
 )

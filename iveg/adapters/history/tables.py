@@ -137,7 +137,7 @@ TABLE_MAPPINGS: dict[type[Any], TableMapping] = {}
 def _table(
     name: str,
     kind: type[Record],
-    *beside: Index | UniqueConstraint,
+    *beside: Column[Any] | Index | UniqueConstraint,
     identity: Sequence[str] = (),
     at: str = "at",
     key: str = "row_id",
@@ -147,7 +147,7 @@ def _table(
     Args:
         name: Of the table.
         kind: The record that has its columns.
-        beside: Its indexes.
+        beside: Its indexes, and columns that only earlier versions filled.
         identity: See ``TableMapping``.
         at: See ``TableMapping``.
         key: Its primary key: a column of the record, of which a later row takes the
@@ -235,6 +235,7 @@ few of its rows."""
 odometry = _table(
     "odometry",
     OdometryRecord,
+    Column("margin_m", Double),
     Index(None, "robot_id", "at", postgresql_include=_CHARTED),
     Index(None, "at"),
 )

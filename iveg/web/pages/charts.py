@@ -20,7 +20,6 @@ from iveg.domain.fleet import FleetDescription, as_counted
 from iveg.domain.latency import DATA, Cell, Segment, Sketch
 from iveg.domain.records import CommandRecord
 from iveg.domain.transports import TRANSPORTS
-from iveg.vital.record import ODOMETRY_PERIOD_S
 
 Trace = Mapping[str, object]
 Values = Sequence[float | None]
@@ -151,7 +150,6 @@ def history_figures(
     robots = sorted((robot for (robot,) in speeds), key=as_counted)
     return {
         **{f"speed/{one}": speed_figure(one, speeds[one,], fleet) for one in robots},
-        "margin": margin_figure({one: speeds[one,] for one in robots}),
         "detections": confidence_figure(counts, threshold),
         "stops": stop_figure(stops),
     }
@@ -199,24 +197,6 @@ def _slow_downs(at: Sequence[float], is_slow: NDArray[np.bool_]) -> Iterator[Tra
             "y0": 0,
             "y1": 1,
         }
-
-
-def margin_figure(series: Mapping[str, Series]) -> bytes:
-    """Least margin of each robot (m), as JSON; a gap where it was not known."""
-    traces = [
-        _series_line(
-            one,
-            one.values["margin_m"],
-            3 * ODOMETRY_PERIOD_S,
-            {"kind": "margin", "robot": robot},
-            # A lone one would have no line.
-            mode="lines+markers",
-            marker={"size": 3},
-        )
-        for robot, one in series.items()
-        if any(margin is not None for margin in one.values["margin_m"])
-    ]
-    return figure_of(traces, ("time", "margin"), {})
 
 
 def climate_figures(lines: Lines) -> dict[str, bytes]:

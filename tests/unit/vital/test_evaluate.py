@@ -5,7 +5,6 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import Origin
 from iveg.domain.records import (
     AlertRecord,
@@ -316,31 +315,6 @@ def test_a_possible_person_is_told_as_such_where_the_rule_counts_them() -> None:
 
     assert desk.sentences().count("log.detection_faint") == 1
     assert desk.sentences().count("log.detection_possible") == 1
-
-
-def test_28_6_a_pose_is_kept_with_its_margin_while_that_is_measured() -> None:
-    desk = watched(Desk())
-    for tenth in range(1, 60):
-        desk.clock.now = tenth / 10
-        if tenth < 10 or tenth >= 40:
-            meet(desk, 6.0)
-        desk.drive("AGI", 0.0, linear=0.5 if tenth < 50 else 0.0)
-
-    rows = [one for one in desk.records(OdometryRecord) if one.robot_id == "AGI"]
-    start = desk.clock().wall - desk.clock.now
-
-    def kept(seconds: float) -> float | None:
-        return [one.margin_m for one in rows if one.at - start <= seconds][-1]
-
-    robot, people = desk.world.robot("AGI"), desk.evaluator.people.known.values()
-    least = LeastMargins([robot], people, desk.clock()).of_robot("AGI")
-    assert least is not None
-    margin_m = kept(1.0)
-    assert margin_m is not None
-    assert 2.0 < least.gap_m - margin_m < 4.0
-    # Measured; nobody has looked for a second; somebody looks; the robot stands.
-    states = [kept(at) is not None for at in (1.0, 1.5, 3.0, 3.5, 4.5, 5.8)]
-    assert states == [True, True, False, False, True, False]
 
 
 async def test_two_poses_a_second_are_kept_and_each_change_of_what_is_applied() -> None:

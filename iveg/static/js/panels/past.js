@@ -5,7 +5,7 @@
  * @typedef {import("./plot.js").Sample} Sample
  * @typedef {import("./plot.js").Span} Span
  * @typedef {{at: string, x: number, y: number, linear: number,
- *   limit_factor: number, margin_m: number | null}} Pose a row of `/odometry`
+ *   limit_factor: number}} Pose a row of `/odometry`
  * @typedef {{at: string, x: number | null, y: number | null}} Sighting one of `/tracks`
  * @typedef {{span: Span, poses: Pose[], sightings: Sighting[],
  *   fastest: number | null}} Past rows oldest first; `fastest` in m/s
@@ -74,11 +74,6 @@ export function limitsOf({ poses, fastest }) {
     value: fastest * limit_factor,
   }));
 }
-
-/** The gap to the nearest person less what stopping takes (m). @param {Past} past
- * @returns {Sample[]} */
-export const marginsOf = ({ poses }) =>
-  poses.map(({ at, margin_m }) => ({ at: Date.parse(at), value: margin_m }));
 
 /**
  * From the robot to the person (m), at each sighting between two poses.

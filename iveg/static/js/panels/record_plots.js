@@ -7,7 +7,7 @@
  */
 
 import { make } from "./dom.js";
-import { distancesOf, limitsOf, marginsOf, speedsOf, zonesOf } from "./past.js";
+import { distancesOf, limitsOf, speedsOf, zonesOf } from "./past.js";
 import { makePlot } from "./plot.js";
 
 /** Nobody is between two looks for longer. */
@@ -36,7 +36,6 @@ export function makePlots(past, { shade, radiusM, speedSaid }, i18n) {
       i18n,
     ),
     radiusM === null ? null : makeDistance(past, radiusM, shade, i18n),
-    makeMargin(past, shade, i18n),
   ].filter((plot) => plot !== null);
   if (!plots.length) return null;
   const section = make("section", "plots");
@@ -60,24 +59,6 @@ function makeDistance(past, radiusM, shade, i18n) {
       says: i18n.t("plot.nearest", { least }),
       span: past.span,
       lines: [away, lineOf("ring", zonesOf(past, radiusM), i18n)],
-      shade,
-    },
-    i18n,
-  );
-}
-
-/** @param {Past} past @param {Shade} shade @param {I18n} i18n */
-function makeMargin(past, shade, i18n) {
-  const margins = marginsOf(past);
-  const known = margins.flatMap(({ value }) => (value === null ? [] : [value]));
-  if (!known.length) return null;
-  const least = Math.min(...known);
-  return makePlot(
-    {
-      title: i18n.t("plot.margin"),
-      says: i18n.t("plot.least_margin", { least }),
-      span: past.span,
-      lines: [{ ...lineOf("margin", margins, i18n), gapMs: UNSEEN_MS }],
       shade,
     },
     i18n,

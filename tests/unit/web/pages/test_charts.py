@@ -17,7 +17,6 @@ def test_the_slow_downs_of_a_robot_are_shaded() -> None:
     values = {
         "linear": (0.8, 0.4, 0.4, 0.8),
         "limit_factor": (1.0, 0.5, 0.5, 1.0),
-        "margin_m": (None,) * 4,
     }
     slowed = Series((10.0, 11.0, 12.0, 13.0), values)
     fleet = FleetDescription.undescribed(["AGI"])
@@ -28,18 +27,18 @@ def test_the_slow_downs_of_a_robot_are_shaded() -> None:
     assert (slow["yref"], slow["x0"], slow["x1"]) == ("y domain", 11_000.0, 13_000.0)
 
 
-def test_a_margin_has_gaps_where_it_was_not_known() -> None:
-    margin = (2.0, 1.5, None, -0.5, 3.0, None)
-    measured = Series((0.0, 0.5, 1.0, 1.5, 9.0, 9.5), {"margin_m": margin})
-    unknown = Series((0.0, 0.5), {"margin_m": (None, None)})
+def test_a_line_breaks_where_nothing_came() -> None:
+    speeds = (0.2, 0.1, 0.3, 0.4, 0.5)
+    values = {"linear": speeds, "limit_factor": (1.0,) * 5}
+    series = Series((0.0, 0.5, 1.0, 9.0, 9.5), values)
+    fleet = FleetDescription.undescribed(["AGI"])
 
-    figure = orjson.loads(charts.margin_figure({"AGI": measured, "AGII": unknown}))
+    line, _ = orjson.loads(charts.speed_figure("AGI", series, fleet))["data"]
 
-    (line,) = figure["data"]
     assert (line["meta"]["robot"], line["connectgaps"]) == ("AGI", False)
     assert [*zip(line["x"], line["y"], strict=True)] == [
-        *((0.0, 2.0), (500.0, 1.5), (1000.0, None), (1500.0, -0.5)),
-        *((1500.0, None), (9000.0, 3.0), (9500.0, None)),
+        *((0.0, 0.2), (500.0, 0.1), (1000.0, 0.3), (1000.0, None)),
+        *((9000.0, 0.4), (9500.0, 0.5)),
     ]
 
 

@@ -10,7 +10,7 @@
  *   y: (number | null)[], meta: Record<string, any>, yaxis?: string, line?: object,
  *   marker?: object}} Trace
  * @typedef {{data: Trace[], layout: Record<string, any>}} Figure
- * @typedef {"speed" | "margin" | "detections" | "stops"} ChartName
+ * @typedef {"speed" | "detections" | "stops"} ChartName
  * @typedef {Record<string, Figure>} Charts by name; `speed/{robot}` for each robot
  * @typedef {{since: number, until: number}} Span Unix milliseconds
  */
@@ -22,7 +22,7 @@ import { fitPaper } from "./paper.js";
 import { keepInStep, placesIn } from "./strips.js";
 
 /** @type {readonly ChartName[]} */
-export const CHARTS = ["speed", "margin", "detections", "stops"];
+export const CHARTS = ["speed", "detections", "stops"];
 const CONFIG = { displayModeBar: false, responsive: true, displaylogo: false };
 /** Numbers only: month names would be in the library's language. */
 const TICKS = [
@@ -66,7 +66,7 @@ export async function drawCharts(charts, asked, i18n) {
     setHidden(need(`#chart-${name}-empty`), data.length > 0);
   }
   // The library's first drawing costs as much again as a small figure.
-  for (const name of /** @type {const} */ (["stops", "detections", "margin"])) {
+  for (const name of /** @type {const} */ (["stops", "detections"])) {
     if (charts[name].data.length === 0) continue;
     await drawFigure(need(`#chart-${name}`), charts[name], asked, i18n);
   }
