@@ -152,7 +152,6 @@ async def test_the_fleets_picture_goes_out_while_somebody_listens(site: Site) ->
     assert (asks, site.robot.node.asks_for_scans) == (True, False)
     assert (qos.reliable, qos.transient_local, qos.depth) == (True, True, 1)
     assert grid.header.frame_id == "map"
-    assert grid.data.size == grid.info.width * grid.info.height
     row, column = divmod(int((grid.data == 100).argmax()), grid.info.width)
     assert abs(grid.info.origin.position.x + column * grid.info.resolution - 5.0) < 1.0
     assert abs(grid.info.origin.position.y + row * grid.info.resolution) < 1.0
