@@ -17,16 +17,8 @@ HALF = Cap(0.5, "person", "p1")
 
 
 def test_at_equal_factors_a_person_is_told_first_and_one_with_a_name() -> None:
-    told = lowest(
-        (
-            Cap(0.5, "watchdog"),
-            Cap(0.5, "robot", "AGII"),
-            Cap(0.5, "person"),
-            HALF,
-            Cap(0.5, "stale"),
-        )
-    )
-    assert told == HALF
+    others = [Cap(0.5, reason) for reason in ("watchdog", "person", "stale")]
+    assert lowest([*others, Cap(0.5, "robot", "AGII"), HALF]) == HALF
 
 
 def test_the_same_factor_with_another_reason_is_told_at_once() -> None:

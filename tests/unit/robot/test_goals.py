@@ -8,7 +8,7 @@ import pytest
 from iveg.domain.geometry import Pose2D
 from iveg.domain.goals import CancelOrder, Goal, GoalOrder
 from iveg.domain.observations import GoalAnswer
-from iveg.ngsi import codec, names
+from iveg.ngsi import codec
 from iveg.robot.goals import Facts, RobotGoals, read_goal
 
 GOAL = Goal("01G", "here", 2.0, 3.0)
@@ -88,13 +88,6 @@ def test_a_new_goal_takes_the_place_of_the_old_one() -> None:
 
 
 # --- the wire ---------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("order", [ORDER, CancelOrder("01G")])
-def test_what_iveg_writes_the_robot_reads(order: GoalOrder | CancelOrder) -> None:
-    payload = codec.write_command(codec.write_goal(order), names.GOAL)
-
-    assert read_goal(payload) == order
 
 
 SET = codec.write_goal(ORDER)["set"]

@@ -204,11 +204,9 @@ def test_a_release_that_came_too_early_has_spent_its_challenge() -> None:
     "payload",
     [
         b'{"cmd": {"release": {"ids": ["boot-b1"], "attempt": "t"}}}',
-        b'{"cmd": {"release": {"ids": ["boot-b1", 1], "ch": "b1n1", "attempt": "t"}}}',
         b'{"cmd": {"release": {"ids": ["boot-b1"], "ch": "b1n1"}}}',
         b'{"cmd": {"release":'
         b' {"ids": ["boot-b1"], "ch": "b1n1", "attempt": "t", "by": "x"}}}',
-        b'{"cmd": {"resume": {"ch": 7, "attempt": "t"}}}',
         b'{"cmd": {"resume": {}, "release": {}}}',
         b'{"release": {"ids": ["boot-b1"], "ch": "b1n1", "attempt": "t"}}',
     ],
@@ -273,6 +271,13 @@ def test_a_level_that_stops_without_a_name_holds(payload: bytes) -> None:
 # --- watchdog -----------------------------------------------------------------------
 
 
+def _lose_iveg(rig: Rig) -> None:
+    """For as long as it takes to be held."""
+    rig.speaks = False
+    rig.run(4.2)
+    rig.speaks = True
+
+
 @pytest.mark.parametrize("seen", [{}, {"AGII": 501}, {"AGI": 7}, {"AGI": 10**9}])
 def test_feedback_that_has_not_seen_us_is_no_sign_of_life(seen: dict[str, int]) -> None:
     rig = moving()
@@ -285,9 +290,7 @@ def test_feedback_that_has_not_seen_us_is_no_sign_of_life(seen: dict[str, int]) 
 
 def test_a_link_hold_clears_itself_after_two_fresh_seconds_and_ramps() -> None:
     rig = moving()
-    rig.speaks = False
-    rig.run(4.2)
-    rig.speaks = True
+    _lose_iveg(rig)
     rig.run(1.9)
     assert rig.holds
     rig.run(0.4)
@@ -299,10 +302,8 @@ def test_a_link_hold_clears_itself_after_two_fresh_seconds_and_ramps() -> None:
 
 def test_a_link_hold_that_another_hold_joined_waits_for_a_person() -> None:
     rig = moving()
-    rig.speaks = False
-    rig.run(4.2)
+    _lose_iveg(rig)
     rig.stop("01STOP")
-    rig.speaks = True
     rig.run(5.0)
     assert [hold.ack for hold in rig.holds] == ["remote", "remote"]
     rig.wished = REST
@@ -314,10 +315,8 @@ def test_the_fourth_link_hold_of_a_minute_waits_for_a_person() -> None:
     rig = moving()
     acks = []
     for _ in range(4):
-        rig.speaks = False
-        rig.run(4.2)
+        _lose_iveg(rig)
         acks.append(rig.holds[0].ack)
-        rig.speaks = True
         rig.run(2.8)
     assert acks == ["auto", "auto", "auto", "remote"]
     rig.run(3.0)

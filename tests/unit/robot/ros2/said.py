@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from iveg.ros2 import cdr
 from iveg.ros2 import messages as ros
 from iveg.ros2.messages import Message
 
+Kind = TypeVar("Kind", bound=Observation)
 WALL = 1_700_000_000.0
 MONO = 1000.0
 
@@ -120,6 +122,11 @@ class Bench:
 
     def tick(self, after: float = 0.0) -> list[Observation]:
         return self.inputs.tick(at(after))
+
+    def only(self, kind: type[Kind], after: float = 0.0) -> Kind:
+        """The one observation of this kind."""
+        (found,) = (one for one in self.tick(after) if isinstance(one, kind))
+        return found
 
     def faults(self, after: float = 0.0) -> dict[str, str]:
         """Code → what about."""

@@ -8,7 +8,6 @@ import pytest
 from iveg.domain.observations import RobotFault
 from iveg.robot.ros2.checking import CheckRow, Lookout, judge
 from iveg.robot.ros2.config import QualityTable, RobotConfig
-from iveg.robot.ros2.inputs import forms_published
 from iveg.robot.ros2.reading import InputFaults, speed_of
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as ros
@@ -53,15 +52,6 @@ def test_a_gate_that_no_base_hears_halves_the_speed(
     Lookout(RobotConfig(), noted, 100.0).look(others, 105.5)
 
     assert speed_of(noted.faults(105.5)) == (0.5, "drive_unheard")
-
-
-def test_a_detector_is_read_by_each_definition_of_its_type() -> None:
-    seen = [endpoint("/boxes", d.BoundingBoxes)]
-
-    assert forms_published("detections_2d", "/boxes", seen) == [
-        d.NumberedBoundingBoxes,
-        d.BoundingBoxes,
-    ]
 
 
 # --- checking ---------------------------------------------------------------------

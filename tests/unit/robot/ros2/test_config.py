@@ -26,12 +26,6 @@ map = "/world"
 stamped_in = true
 max_speed = 0.6
 
-[transforms]
-max_age_s = 0.3
-
-[detector]
-p_min = 0.5
-
 [qos.scan]
 reliable = true
 depth = 2
@@ -48,7 +42,6 @@ def test_what_is_said_counts_and_the_rest_stays() -> None:
     assert (topics["tf"], topics["battery"]) == ("/tf", "")
     assert (config.frames.map, config.frames.odom) == ("world", "odom")
     assert (config.drive.stamped_in, config.drive.max_speed) == (True, 0.6)
-    assert (config.transforms.max_age_s, config.detector.p_min) == (0.3, 0.5)
     assert config.quality("scan") == Qos(reliable=True, depth=2)
     assert config.quality("tf") == names.TF
 

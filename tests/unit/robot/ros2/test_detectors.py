@@ -39,9 +39,7 @@ def told(
     base = said.link("map", "base_link", 11.0, 1.0, math.pi / 2)
     one = bench().hear("tf_static", tf(base)).hear("depth", depth())
     one.inputs.hear(topic, [cdr.write(message)], MONO, form=form or type(message))
-    (found,) = one.tick()
-    assert isinstance(found, DetectionFrame)
-    return found
+    return one.only(DetectionFrame)
 
 
 # --- with depth ---------------------------------------------------------------------
@@ -189,19 +187,3 @@ def test_a_picture_with_nobody_in_it_is_an_empty_frame(
     found = told(topic, message)
 
     assert (found.detections, found.unread) == ((), ())
-
-
-@pytest.mark.parametrize(
-    ("topic", "message"),
-    [
-        ("detections_2d", d.BoundingBoxes(OPTICAL, UNSEEN, (
-            replace(yolox_box(MIDDLE, TALL), class_id="1"),))),
-        ("detections_3d", d.DetectionArray(OPTICAL, (d.Detection(1, "", 0.9, "", bbox3d=
-            d.BoundingBox3D(ros.Pose(ros.Point(z=3.0)),
-                            frame_id="camera_optical")),))),
-    ],
-)  # fmt: skip
-def test_a_class_that_is_a_number_is_sent_as_one(topic: str, message: Any) -> None:
-    (found,) = told(topic, message).detections
-
-    assert found.class_id == "1"

@@ -23,9 +23,8 @@ from tests.unit.robot.ros2.said import Bench, link, look, seen, tf
 
 
 def test_odometry_is_moved_into_map() -> None:
-    (found,) = Bench().hear("odometry", said.odometry(2.0, 0.4, w=0.1)).tick()
+    found = Bench().hear("odometry", said.odometry(2.0, 0.4, w=0.1)).only(Odometry)
 
-    assert isinstance(found, Odometry)
     assert (found.pose.x, found.pose.y) == (12.0, 0.0)
     assert (found.twist.linear_x, found.twist.angular_z) == (0.4, 0.1)
 
@@ -33,9 +32,8 @@ def test_odometry_is_moved_into_map() -> None:
 def test_odometry_of_another_frame_of_the_robot_is_moved_to_base_link() -> None:
     bench = Bench().hear("tf_static", tf(link("footprint", "base_link", -0.2)))
 
-    (found,) = bench.hear("odometry", said.odometry(2.0, child="footprint")).tick()
+    found = bench.hear("odometry", said.odometry(2.0, child="footprint")).only(Odometry)
 
-    assert isinstance(found, Odometry)
     assert found.pose.x == pytest.approx(11.8)
 
 
@@ -158,9 +156,8 @@ def test_a_scan_is_placed_by_where_the_laser_was_when_it_swept() -> None:
     bench.hear("odometry", said.odometry(1.2, after=0.2))
     bench.hear("scan", said.scan(after=0.1))
 
-    found = bench.tick(0.2)[1]
+    found = bench.only(LaserScan, 0.2)
 
-    assert isinstance(found, LaserScan)
     assert found.mount.x == pytest.approx(0.3 - 0.1)
 
 
@@ -171,9 +168,8 @@ def test_a_laser_upside_down_turns_the_other_way() -> None:
     bench.hear("tf_static", tf(ros.TransformStamped(header, "laser", rolled)))
     bench.hear("odometry", said.odometry()).hear("scan", said.scan())
 
-    found = bench.tick()[1]
+    found = bench.only(LaserScan)
 
-    assert isinstance(found, LaserScan)
     assert (found.angle_min, found.angle_increment) == (0.5, -0.5)
 
 
@@ -221,9 +217,8 @@ def test_only_a_beam_that_did_not_come_back_found_nothing() -> None:
     message = replace(message, range_min=0.0)
     bench = Bench().hear("odometry", said.odometry()).hear("scan", message)
 
-    found = bench.tick()[1]
+    found = bench.only(LaserScan)
 
-    assert isinstance(found, LaserScan)
     unknown, nothing = 0.0, math.inf
     assert found.ranges.tolist() == [*[unknown] * 4, nothing, nothing, 2.0]
     assert found.returns().tolist() == [False] * 6 + [True]
@@ -240,9 +235,8 @@ def test_a_detection_that_cannot_be_is_counted_beside_the_others(
 ) -> None:
     bench = Bench().hear("tf", tf(link("odom", "base_link")))
 
-    (found,) = bench.hear("detections_3d", look(seen(), bad)).tick()
+    found = bench.hear("detections_3d", look(seen(), bad)).only(DetectionFrame)
 
-    assert isinstance(found, DetectionFrame)
     assert (len(found.detections), len(found.unread)) == (1, 1)
 
 
@@ -256,9 +250,8 @@ def test_a_plan_is_moved_into_map_and_no_pose_of_it_is_told_twice(count: int) ->
         ros.PoseStamped(header, ros.Pose(ros.Point(float(x)))) for x in range(count)
     )
 
-    (found,) = Bench().hear("path", ros.Path(header, poses)).tick()
+    found = Bench().hear("path", ros.Path(header, poses)).only(Navigation)
 
-    assert isinstance(found, Navigation)
     assert len(set(found.path)) == len(found.path) <= 1024
     assert found.path[0] == (10.0, 0.0)
     assert found.path[-1] == found.goal == (count + 9.0, 0.0)
@@ -270,9 +263,8 @@ def test_a_plan_is_moved_into_map_and_no_pose_of_it_is_told_twice(count: int) ->
 def test_a_battery_is_read_as_a_share(told: float, share: float | None) -> None:
     bench = Bench().hear("battery", ros.BatteryState(percentage=told, voltage=25.5))
 
-    (battery,) = bench.tick()
+    battery = bench.only(Battery)
 
-    assert isinstance(battery, Battery)
     assert battery.percentage == (None if share is None else pytest.approx(share))
     assert battery.voltage == 25.5
 

@@ -76,22 +76,12 @@ def bench() -> Bench:
     return found.hear("camera_info", info())
 
 
-def grounded(bench: Bench, after: float = 0.0) -> DetectionFrame:
-    (found,) = bench.tick(after)
-    assert isinstance(found, DetectionFrame)
-    return found
-
-
 def test_a_mask_says_which_pixels_are_whose() -> None:
     mask = np.zeros((HEIGHT, WIDTH))
     mask[10:40, 25:33] = 1
     mask[10:40, 33:40] = 2
-    found = grounded(
-        bench()
-        .hear("depth", depth())
-        .hear("mask", image(mask, "mono8", "u1"))
-        .hear("detections_2d", look(count=2))
-    )
+    one = bench().hear("depth", depth()).hear("mask", image(mask, "mono8", "u1"))
+    found = one.hear("detections_2d", look(count=2)).only(DetectionFrame)
 
     left, right = (one.box for one in found.detections)
     assert left.ymin > right.ymax - 0.1
@@ -102,7 +92,7 @@ def test_a_look_whose_depth_never_comes_counts_everybody_as_lost() -> None:
     one = bench().hear("detections_2d", look())
     one.tick()
 
-    found = grounded(one, 0.4)
+    found = one.only(DetectionFrame, 0.4)
 
     assert (found.detections, len(found.unread)) == ((), 1)
     assert one.faults(0.4)["no_depth"] == "/boxes"
