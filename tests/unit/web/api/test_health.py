@@ -14,19 +14,17 @@ def whole(desk: WebDesk) -> WebDesk:
     return desk
 
 
-async def test_anybody_may_ask_whether_the_process_answers_and_learns_no_more() -> None:
-    async with WebDesk().stranger() as stranger:
-        answer = await stranger.get("/healthz")
-
-    assert (answer.status_code, answer.text) == (200, "ok\n")
-
-
-async def test_ready_is_200_only_when_every_hop_is_well() -> None:
+async def test_ready_is_200_when_every_hop_is_well_and_strangers_learn_no_more() -> (
+    None
+):
     async with whole(WebDesk()).program() as program:
         well = await program.get("/readyz")
-    async with WebDesk().program() as program:
+    desk = WebDesk()
+    async with desk.program() as program, desk.stranger() as stranger:
         ill = await program.get("/readyz")
+        alive = await stranger.get("/healthz")
 
+    assert (alive.status_code, alive.text) == (200, "ok\n")
     kept = {"accounts": "ok"}
     assert (well.status_code, well.json()) == (200, {"ok": True} | kept)
     assert (ill.status_code, ill.json()) == (503, {"ok": False} | kept)

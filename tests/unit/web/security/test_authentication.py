@@ -154,7 +154,6 @@ async def test_f42_an_ended_session_stops_from_our_own_page_alone(
     "headers",
     [
         {},
-        {"Sec-Fetch-Site": "same-origin"},
         {"X-IVEG": "1"},
         {"X-IVEG": "1", "Sec-Fetch-Site": "cross-site"},
         {"X-IVEG": "1", "Origin": "http://evil.test"},
