@@ -229,14 +229,13 @@ async def test_until_somebody_is_admin_every_page_says_so_and_a_program_stops(
 ) -> None:
     monkeypatch.setattr(desk.pages, "_is_ready", desk.people.is_led)
     desk.book.accounts["P9"] = chief
-    html = {"Accept": "text/html"}
     async with desk.page() as page, desk.program() as program:
-        strangers = [await page.get(one, headers=html) for one in ("/", "/signin")]
+        page.headers["Accept"] = "text/html"
+        shown = [await page.get(one) for one in ("/", "/signin")]
         await enter(page, name=ANA.name, password="acelga-1234")
-        own = [await page.get(one, headers=html) for one in ("/", "/users", "/none")]
+        shown += [await page.get(one) for one in ("/", "/users", "/none")]
         stopped = await program.post("/api/v1/robots/AGI/stop")
 
-    shown = [*strangers, *own]
     assert [one.status_code for one in shown] == [401, 200, 200, 403, 404]
     assert ['id="unready"' in one.text for one in shown] == [is_said] * 5
     assert stopped.status_code == 202
@@ -276,17 +275,3 @@ async def test_a_program_acts_by_its_own_name(desk: PeoplesDesk) -> None:
     (row,) = desk.records(AuditRecord)
     assert command.requesters == ("mes-stop",)
     assert (row.person, row.name, row.method) == ("stop", "mes-stop", "token")
-
-
-async def test_the_last_use_is_written_once_a_minute(desk: PeoplesDesk) -> None:
-    began, kept = desk.clock().wall, list[float | None]()
-    desk.book.on_keep.append(
-        lambda: kept.append(desk.book.tokens[digest_of("read")].used_at)
-    )
-    async with desk.caller("read") as program:
-        for _ in range(3):
-            await program.get("/api/v1/robots")
-            desk.clock.now += 59.0
-
-    assert kept == [began, began + 118.0]
-    assert desk.book.tokens[digest_of("stop")].used_at is None
