@@ -2,7 +2,7 @@
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 
 import pytest
@@ -47,36 +47,22 @@ class Line:
         self._writer.close()
 
 
-class Caller:
-    """Opens connections to one server."""
-
-    def __init__(self, place: str) -> None:
-        self._host, _, port = place.partition(":")
-        self._port = int(port)
-        self.lines: list[Line] = []
-
-    async def open(self) -> Line:
-        line = Line(*await asyncio.open_connection(self._host, self._port))
-        self.lines.append(line)
-        return line
-
-
 @asynccontextmanager
-async def called(desk: WebDesk) -> AsyncIterator[Caller]:
+async def called(desk: WebDesk) -> AsyncIterator[Callable[[], Awaitable[Line]]]:
+    """Yields what opens a connection to its server."""
+    lines: list[Line] = []
     async with desk.serving() as place, asyncio.timeout(20):
-        caller = Caller(place)
+        host, _, port = place.partition(":")
+
+        async def connect() -> Line:
+            lines.append(Line(*await asyncio.open_connection(host, int(port))))
+            return lines[-1]
+
         try:
-            yield caller
+            yield connect
         finally:
-            for line in caller.lines:
+            for line in lines:
                 line.close()
-
-
-async def taken(desk: WebDesk, connections: int) -> None:
-    """Until the server has so many."""
-    async with asyncio.timeout(10):
-        while len(desk.http.table) != connections:  # noqa: ASYNC110 - no event
-            await asyncio.sleep(0.005)
 
 
 def small_desk() -> WebDesk:
@@ -99,8 +85,8 @@ def small_desk() -> WebDesk:
 @pytest.mark.parametrize("piece", [10_000, 100_000])
 async def test_a_head_that_is_too_long_is_refused(head: bytes, piece: int) -> None:
     desk = WebDesk()
-    async with called(desk) as caller:
-        line = await caller.open()
+    async with called(desk) as connect:
+        line = await connect()
         for start in range(0, len(head), piece):
             line.say(head[start : start + piece])
             await asyncio.sleep(0)
@@ -111,23 +97,15 @@ async def test_a_head_that_is_too_long_is_refused(head: bytes, piece: int) -> No
 async def test_a_head_that_does_not_come_in_time_is_ended() -> None:
     desk = WebDesk()
     desk.http = bounded_http(head_s=0.01)
-    async with called(desk) as caller:
-        assert await (await caller.open()).is_closed()
-        assert await (await caller.open()).say(HALF).is_closed()
-        whole = (await caller.open()).say(HALF + b"Content-Length: 9\r\n\r\n1")
+    async with called(desk) as connect:
+        assert await (await connect()).is_closed()
+        assert await (await connect()).say(HALF).is_closed()
+        whole = (await connect()).say(HALF + b"Content-Length: 9\r\n\r\n1")
         assert await whole.status() == 404
 
 
 async def test_f59_a_stop_gets_through_where_half_requests_take_every_place() -> None:
-    desk = small_desk()
-    async with called(desk) as caller:
-        for _ in range(100):
-            (await caller.open()).say(HALF)
-        await taken(desk, 10)
-        assert await (await caller.open()).say(STOP).status() == 202
-
-
-async def test_an_open_socket_keeps_its_place_in_a_flood() -> None:
+    """And an open socket keeps its place."""
     desk = small_desk()
     upgrade = (
         "GET /live HTTP/1.1\r\nHost: iveg\r\nConnection: Upgrade\r\n"
@@ -136,12 +114,15 @@ async def test_an_open_socket_keeps_its_place_in_a_flood() -> None:
         "Sec-WebSocket-Protocol: iveg.2\r\n"
         f"Authorization: Bearer {API_TOKEN}\r\n\r\n"
     )
-    async with called(desk) as caller:
-        page = (await caller.open()).say(upgrade.encode())
+    async with called(desk) as connect:
+        page = (await connect()).say(upgrade.encode())
         assert await page.status() == 101
         for _ in range(100):
-            (await caller.open()).say(HALF)
-        await taken(desk, 10)
+            (await connect()).say(HALF)
+        async with asyncio.timeout(10):
+            while len(desk.http.table) != 10:  # noqa: ASYNC110 - no event
+                await asyncio.sleep(0.005)
+        assert await (await connect()).say(STOP).status() == 202
         assert desk.hub.watchers == 1
 
 
@@ -155,12 +136,12 @@ async def test_the_oldest_idle_connection_goes_before_one_that_is_answered() -> 
         return Response(status_code=204)
 
     desk.app.router.routes.insert(0, Route("/healthz", slow))
-    async with called(desk) as caller:
-        busy = (await caller.open()).say(HALF.replace(b"/ ", b"/healthz ") + b"\r\n")
+    async with called(desk) as connect:
+        busy = (await connect()).say(HALF.replace(b"/ ", b"/healthz ") + b"\r\n")
         await began.wait()
-        idle = await caller.open()
+        idle = await connect()
         for _ in range(9):
-            (await caller.open()).say(HALF)
+            (await connect()).say(HALF)
         assert await idle.is_closed()
         held.set()
         assert await busy.status() == 204

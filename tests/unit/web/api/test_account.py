@@ -9,9 +9,11 @@ from typing import Any
 import httpx
 import pytest
 
+from iveg.cli.running import reachable_host
 from iveg.domain.accounts import digest_of
 from iveg.domain.records import AuditRecord
 from iveg.web.api import account
+from tests.unit.web.desk import LINK
 from tests.unit.web.security.test_people import ANA, CHIEF, OWN, PeoplesDesk, enter
 
 CHANGE = {"old": "acelga-1234", "new": "berenjena-77"}
@@ -204,22 +206,24 @@ async def test_nobody_changes_their_own_account_so_that_an_admin_stays(
 
 
 @pytest.mark.parametrize(
-    ("body", "status"),
+    ("path", "body", "status"),
     [
-        ({"name": "ANA núñez", "role": "viewer"}, 409),
-        ({"name": "Console", "role": "viewer"}, 422),
-        ({"name": "Luz", "role": "program"}, 422),
+        ("users", {"name": "ANA núñez", "role": "viewer"}, 409),
+        ("users", {"name": "Console", "role": "viewer"}, 422),
+        ("users", {"name": "Luz", "role": "program"}, 422),
+        ("tokens", {"name": "MES-read", "scope": "read"}, 409),
+        ("tokens", {"name": "X", "scope": "admin"}, 422),
     ],
 )
-async def test_what_cannot_be_an_account_is_refused(
-    desk: AccessDesk, body: dict[str, object], status: int
+async def test_what_cannot_be_an_account_or_a_token_is_refused(
+    desk: AccessDesk, path: str, body: dict[str, object], status: int
 ) -> None:
-    before = dict(desk.book.accounts)
+    before = dict(desk.book.accounts), dict(desk.book.tokens)
     async with desk.admin() as chief:
-        refused = await chief.post("/api/v1/users", json=body)
+        refused = await chief.post(f"/api/v1/{path}", json=body)
 
     assert refused.status_code == status
-    assert desk.book.accounts == before
+    assert (desk.book.accounts, desk.book.tokens) == before
 
 
 # --- sessions -----------------------------------------------------------------------
@@ -331,15 +335,30 @@ async def test_who_is_revoked_is_out_before_the_answer(desk: AccessDesk) -> None
     assert await desk.programs() == ["mes-operate", "mes-read"]
 
 
-@pytest.mark.parametrize(
-    ("body", "status"), [({"name": "MES-read"}, 409), ({"scope": "admin"}, 422)]
-)
-async def test_what_cannot_be_a_token_is_refused(
-    desk: AccessDesk, body: dict[str, object], status: int
-) -> None:
-    before = await desk.programs()
-    async with desk.browser("admin") as chief:
-        refused = await chief.post(TOKENS, json={"name": "X", "scope": "read"} | body)
+# --- another device signs in by a code that an operator shows it ---------------------
 
-    assert refused.status_code == status
-    assert await desk.programs() == before
+
+@pytest.mark.parametrize(
+    ("base", "is_local"),
+    [
+        ("http://192.168.1.20:8123", False),
+        ("http://127.0.0.1:8000", True),
+        ("http://[::1]:8000", True),
+        ("http://localhost:8000", True),
+    ],
+)
+async def test_the_link_has_the_address_that_the_browser_reached_and_says_if_local(
+    desk: AccessDesk, base: str, *, is_local: bool
+) -> None:
+    desk.app.include_router(account.sign_in_code_router(LINK))
+    async with desk.browser() as browser:
+        told = (await browser.get(f"{base}/api/v1/sign-in-code")).json()
+
+    assert told["link"] == f"{base}/signin#token={LINK}"
+    assert told["image"].startswith("data:image/svg+xml")
+    assert told["local"] is is_local
+
+
+@pytest.mark.parametrize("every", ["0.0.0.0", "::"])  # noqa: S104 - nobody listens
+def test_a_server_at_every_address_is_named_by_one_that_leads_there(every: str) -> None:
+    assert reachable_host(every) not in (every, "")

@@ -5,7 +5,8 @@ import pytest
 
 from iveg.domain.detector import OutOfService
 from iveg.domain.records import LogRecord
-from tests.builders import START, odometry, origin
+from tests.builders import START
+from tests.unit.vital.desk import conditions_of
 from tests.unit.web.desk import WebDesk
 
 
@@ -47,6 +48,12 @@ async def test_out_of_service_nobody_waits_for_it_until_it_is_put_back() -> None
         "out_since": "2023-11-14T22:13:20.000Z",
         "out_reason": "lens broken",
     }
+    said = {"by": "ana", "reason": "lens broken"}
+    word = OutOfService("ana", START.wall, "boot-a", "lens broken")
+    assert desk.detector_store.written == {"AGI": word}
+    lines = [one for one in desk.records(LogRecord) if one.key == "log.detector_out"]
+    assert [one.slots for one in lines] == [{"robot": "AGI", **said}]
+    assert "alert.detector_out_of_service" in conditions_of(desk)
 
     await put(desk, in_service=True)
     await desk.wait(0.1)
@@ -54,25 +61,6 @@ async def test_out_of_service_nobody_waits_for_it_until_it_is_put_back() -> None
     assert factor(desk) == 0.5
     assert desk.detector_store.written == {}
     assert "log.detector_in" in desk.sentences()
-
-
-async def test_it_is_on_the_record_with_its_author_and_a_p3_while_it_lasts() -> None:
-    desk = blind()
-
-    await put(desk)
-    await desk.wait(0.1)
-
-    lines = [one for one in desk.records(LogRecord) if one.key == "log.detector_out"]
-    word = OutOfService("ana", START.wall, "boot-a", "lens broken")
-    assert desk.detector_store.written == {"AGI": word}
-    said = {"by": "ana", "reason": "lens broken"}
-    assert [one.slots for one in lines] == [{"robot": "AGI", **said}]
-    (stands,) = (
-        one.condition
-        for one in desk.evaluator.alerts.waiting
-        if one.condition.key == "alert.detector_out_of_service"
-    )
-    assert stands.slots == {"robot": "AGI", **said}
 
 
 @pytest.mark.parametrize("reason", ["", "   ", "\u200b"])
@@ -83,17 +71,6 @@ async def test_without_a_reason_it_stays_in_service(reason: str) -> None:
 
     assert (answer.status_code, factor(desk)) == (422, 0.5)
     assert desk.detector_store.written == {}
-
-
-async def test_the_robots_next_boot_puts_it_back_and_says_so() -> None:
-    desk = blind()
-    await put(desk)
-
-    desk.hear(odometry("AGI", origin=origin(1, boot="boot-b")))
-    await desk.wait(0.1)
-
-    assert factor(desk) == 0.5
-    assert "log.detector_booted" in desk.sentences()
 
 
 async def test_what_the_disk_does_not_take_changes_nothing() -> None:

@@ -180,16 +180,15 @@ async def test_13_18_a_csv_for_a_reader_is_one_that_her_excel_opens(
     assert "50\u00a0%" in row["qué pasó"]
 
 
-@pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t"])
 async def test_a_spreadsheet_runs_nothing_from_a_csv(
-    client: Client, past: Past, start: str
+    client: Client, past: Past
 ) -> None:
-    past.holds(alert_record(note=f"{start}cmd()"))
+    past.holds(*(alert_record(alert_id=one, note=f"{one}cmd()") for one in "=+-@\t"))
 
     answer = await client.get("/api/v1/alerts", params={"format": "csv"})
 
-    [row] = csv.DictReader(io.StringIO(answer.text))
-    assert row["note"] == f"'{start}cmd()"
+    notes = {row["note"] for row in csv.DictReader(io.StringIO(answer.text))}
+    assert notes == {f"'{one}cmd()" for one in "=+-@\t"}
 
 
 async def test_an_export_runs_through_every_page(client: Client, past: Past) -> None:

@@ -82,18 +82,6 @@ async def test_a_mark_frees_robots_is_a_notice_on_record_and_can_be_taken_back()
     assert told[0].slots == {"by": "ana", "x": 5.0, "y": 0.0}
 
 
-async def test_the_end_of_the_day_ends_it() -> None:
-    desk = WebDesk()
-    see(desk, 5.0)
-    await mark(desk)
-
-    desk.clock.now += 47 * 60.0
-    await desk.wait(0.1)
-
-    assert await listed(desk, "things") == []
-    assert "log.thing_over" in desk.sentences()
-
-
 @pytest.mark.parametrize(
     ("places", "confidence"),
     [((5.0, 5.3, 5.6, 5.9, 6.2), 0.85), ((5.0,), 0.95)],

@@ -86,11 +86,13 @@ def stops(html: str) -> list[str]:
 
 
 @pytest.mark.parametrize("path", [*ROUTES, "/nowhere"])
-async def test_every_page_of_somebody_signed_in_has_each_stop_once(
+async def test_every_page_has_each_stop_once_and_no_inline_script_or_style(
     browser: Client, path: str
 ) -> None:
-    answer = await browser.get(path)
-    assert stops(answer.text) == ["AGI", "AGII", "fleet"]
+    html = (await browser.get(path)).text
+    assert stops(html) == ["AGI", "AGII", "fleet"]
+    assert re.findall(r"<script(?![^>]* src=)|<style|\sstyle=|\son[a-z]+=", html) == []
+    assert "http://" not in html
 
 
 async def test_a_stranger_is_told_how_to_get_in(
@@ -134,21 +136,6 @@ async def test_the_remembered_look_comes_with_the_page_and_a_made_up_one_does_no
     assert 'data-theme="{}" data-palette="{}"'.format(*look) in answer.text
 
 
-@pytest.mark.parametrize("path", [*ROUTES, "/signin"])
-async def test_no_page_holds_inline_script_or_style(browser: Client, path: str) -> None:
-    html = (await browser.get(path)).text
-    assert re.findall(r"<script(?![^>]* src=)|<style|\sstyle=|\son[a-z]+=", html) == []
-    # The way in names the address that was asked.
-    assert "http://" not in html.replace("http://iveg", "")
-
-
-async def test_names_from_outside_are_text_and_not_markup(browser: Client) -> None:
-    html = (await browser.get("/")).text
-    assert "Ana &lt;i&gt;" in html
-    assert "Almería &lt;b&gt;1&lt;/b&gt;" in html
-    assert "<b>1</b>" not in html
-
-
 async def test_about_says_what_stop_is_not_and_tells_the_rule(browser: Client) -> None:
     html = (await browser.get("/about", headers={"Accept-Language": "en"})).text
     assert "It is not an emergency stop and not certified." in html
@@ -175,8 +162,10 @@ async def test_release_and_resume_stand_apart_from_stop(browser: Client) -> None
 
 
 @pytest.mark.parametrize("kind", ["decision", "command"])
-async def test_a_record_has_an_address_and_its_id_is_text(
+async def test_names_and_ids_from_outside_are_text_and_not_markup(
     browser: Client, kind: str
 ) -> None:
     html = (await browser.get(f'/{kind}s/"><img src=x>')).text
     assert f'data-{kind}="&#34;&gt;&lt;img src=x&gt;"' in html
+    assert "Ana &lt;i&gt;" in html
+    assert "Almería &lt;b&gt;1&lt;/b&gt;" in html

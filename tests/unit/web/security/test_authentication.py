@@ -6,7 +6,7 @@ from typing import Annotated
 
 import httpx
 import pytest
-from fastapi import APIRouter, Depends, FastAPI, WebSocket
+from fastapi import APIRouter, Depends, FastAPI
 from fastapi.routing import iter_route_contexts
 from starlette.requests import Request
 from starlette.responses import Response
@@ -151,36 +151,27 @@ async def test_f42_an_ended_session_stops_from_our_own_page_alone(
 
 
 @pytest.mark.parametrize(
-    "headers",
+    ("headers", "status"),
     [
-        {},
-        {"Sec-Fetch-Site": "same-origin"},
-        {"X-IVEG": "1"},
-        {"X-IVEG": "1", "Sec-Fetch-Site": "cross-site"},
-        {"X-IVEG": "1", "Origin": "http://evil.test"},
-        {"X-IVEG": "1", "Origin": "http://iveg.test:81"},
+        ({}, 403),
+        ({"Sec-Fetch-Site": "same-origin"}, 403),
+        ({"X-IVEG": "1"}, 403),
+        ({"X-IVEG": "1", "Sec-Fetch-Site": "cross-site"}, 403),
+        ({"X-IVEG": "1", "Origin": "http://evil.test"}, 403),
+        ({"X-IVEG": "1", "Origin": "http://iveg.test:81"}, 403),
+        (OWN, 200),
+        ({"X-IVEG": "1", "Sec-Fetch-Site": "none"}, 200),
+        ({"X-IVEG": "1", "Origin": "http://iveg.test"}, 200),
+        ({"X-IVEG": "1", "Origin": "https://IVEG.test"}, 200),
     ],
 )
 async def test_a_cookie_alone_proves_nothing_on_a_post(
-    operator: Client, headers: dict[str, str]
+    operator: Client, headers: dict[str, str], status: int
 ) -> None:
     answer = await operator.post("/stop", headers=headers)
 
-    assert answer.status_code == 403
-    assert answer.json()["type"] == "urn:iveg:foreign-origin"
-
-
-@pytest.mark.parametrize(
-    "headers",
-    [
-        OWN,
-        {"X-IVEG": "1", "Sec-Fetch-Site": "none"},
-        {"X-IVEG": "1", "Origin": "http://iveg.test"},
-        {"X-IVEG": "1", "Origin": "https://IVEG.test"},
-    ],
-)
-async def test_the_own_page_may_post(operator: Client, headers: dict[str, str]) -> None:
-    assert (await operator.post("/stop", headers=headers)).status_code == 200
+    assert answer.status_code == status
+    assert status == 200 or answer.json()["type"] == "urn:iveg:foreign-origin"
 
 
 @pytest.mark.parametrize(
@@ -198,26 +189,12 @@ async def test_a_body_that_is_not_json_is_refused(
 
 
 def test_a_route_or_websocket_that_declares_nothing_is_found() -> None:
-    router = APIRouter(prefix="/api")
-    guarded = APIRouter(dependencies=[Depends(require("read"))])
-
-    for owner in (router, guarded):
-        owner.add_api_route("/forgot", lambda: None)
-        owner.add_api_websocket_route("/live", forgetful_socket)
     app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None)
-    app.include_router(router)
+    guarded = APIRouter(dependencies=[Depends(require("read"))])
+    for owner, prefix in ((app.router, "/open"), (guarded, "/guarded")):
+        owner.add_api_route(prefix, lambda: None)
+        owner.add_api_websocket_route(f"{prefix}/live", lambda: None)
     app.include_router(guarded)
 
-    declared = {
-        one.path: declared_action(one) for one in iter_route_contexts(app.routes)
-    }
-    assert declared == {
-        "/api/forgot": None,
-        "/api/live": None,
-        "/forgot": "read",
-        "/live": "read",
-    }
-
-
-async def forgetful_socket(websocket: WebSocket) -> None:
-    """A WebSocket whose author forgot to declare a role."""
+    declared = [declared_action(one) for one in iter_route_contexts(app.routes)]
+    assert declared == [None, None, "read", "read"]

@@ -251,17 +251,3 @@ async def test_a_program_acts_by_its_own_name(desk: PeoplesDesk) -> None:
     (row,) = desk.records(AuditRecord)
     assert command.requesters == ("mes-stop",)
     assert (row.person, row.name, row.method) == ("stop", "mes-stop", "token")
-
-
-async def test_the_last_use_is_written_once_a_minute(desk: PeoplesDesk) -> None:
-    began, kept = desk.clock().wall, list[float | None]()
-    desk.book.on_keep.append(
-        lambda: kept.append(desk.book.tokens[digest_of("read")].used_at)
-    )
-    async with desk.caller("read") as program:
-        for _ in range(3):
-            await program.get("/api/v1/robots")
-            desk.clock.now += 59.0
-
-    assert kept == [began, began + 118.0]
-    assert desk.book.tokens[digest_of("stop")].used_at is None
