@@ -75,26 +75,23 @@ def test_the_message_at_which_a_clock_jumps_is_excluded(
     assert clock.state == "corrected"
 
 
-def test_a_robot_that_does_not_echo_is_taken_at_its_word_and_marked() -> None:
-    clock = ClockOffset()
-
-    found = said(Talker(acknowledgements=False, up_s=0.030), clock, 2.0)
-
-    assert found[-1] == pytest.approx(0.030, abs=STAMP_ROUNDING_S)
-    assert clock.state == "assumed"
-    assert clock.uncertainty_s is None
-
-
-@pytest.mark.parametrize("ahead_s", [0.3, -3600.0])
-def test_a_future_or_past_that_nothing_explains_gives_no_number(
-    ahead_s: float,
+@pytest.mark.parametrize(
+    ("ahead_s", "state"),
+    [(0.0, "assumed"), (0.3, "untrusted"), (-3600.0, "untrusted")],
+)
+def test_a_robot_that_does_not_echo_is_taken_at_its_word_unless_nothing_explains_it(
+    ahead_s: float, state: str
 ) -> None:
     clock = ClockOffset()
 
-    found = said(Talker(acknowledgements=False, ahead_s=ahead_s), clock, 2.0)
+    talker = Talker(acknowledgements=False, up_s=0.030, ahead_s=ahead_s)
+    found = numbers(said(talker, clock, 2.0))
 
-    assert numbers(found) == []
-    assert clock.state == "untrusted"
+    assert clock.state == state
+    assert clock.uncertainty_s is None
+    assert found[-1:] == [pytest.approx(0.030, abs=STAMP_ROUNDING_S)] * (
+        state == "assumed"
+    )
 
 
 def test_no_stamp_whatever_it_says_gives_a_number_below_zero() -> None:

@@ -12,7 +12,6 @@ from iveg.domain.tracking.people import People
 from tests.unit.domain.scene import Scene, person
 
 ON = DetectionRule(possible_people=True)
-OFF = DetectionRule(possible_people=False)
 LOOK_S = 0.3
 
 
@@ -26,18 +25,6 @@ def looked(
         scene.look("AGI", person(x, probability=chance))
 
 
-def test_a_weak_box_moves_no_ring_of_a_sure_one() -> None:
-    scene = Scene(rule=ON)
-    looked(scene, 0.85)
-    looked(scene, 0.55, x=5.5)
-
-    (somebody,) = scene.everyone
-    assert sorted((one.x, one.possible) for one in somebody.sightings) == [
-        (5.0, False),
-        (5.5, True),
-    ]
-
-
 def test_a_sure_box_takes_the_place_of_weak_ones() -> None:
     scene = Scene(rule=ON)
     looked(scene, 0.85, 0.55)
@@ -45,16 +32,6 @@ def test_a_sure_box_takes_the_place_of_weak_ones() -> None:
 
     (somebody,) = scene.everyone
     assert [(one.x, one.possible) for one in somebody.sightings] == [(5.5, False)]
-
-
-def test_where_a_weak_box_stands_no_sure_ring_is_cleared() -> None:
-    scene = Scene(rule=ON)
-    looked(scene, 0.85)
-    for _ in range(30):
-        looked(scene, 0.55, every_s=0.1)
-
-    (somebody,) = scene.everyone
-    assert {one.possible for one in somebody.sightings} == {False, True}
 
 
 # --- beyond the walls -------------------------------------------------------------
