@@ -7,14 +7,7 @@ import pytest
 from iveg.domain.stop import STEPS, Changed, Key, OffTable, SendStop, State, StopMachine
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from tests.builders import at
-from tests.unit.domain.bench import (
-    RED_BUTTON,
-    Bench,
-    levels,
-    pressed,
-    sends,
-    standing,
-)
+from tests.unit.domain.bench import RED_BUTTON, Bench, levels, pressed, sends, standing
 
 # --- REQUESTED, SENT --------------------------------------------------------------
 

@@ -36,10 +36,7 @@ def test_i2_a_release_is_sent_once_with_the_remote_holds_and_the_challenge() -> 
     assert set(sent.attempt.ids) == {bench.ours.id, BOOT_HOLD.id}
     assert sent.ours == (bench.ours.id,)
     assert sent.attempt.challenge == "0123456789abcdef"
-    assert sent.attempt.command.transports == {
-        "direct": "pending",
-        "fiware": "pending",
-    }
+    assert sent.attempt.command.transports == {"direct": "pending", "fiware": "pending"}
 
 
 @pytest.mark.parametrize("seen", [(), ("id-1",), ("id-1", "boot-b1", "more")])
