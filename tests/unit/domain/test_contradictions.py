@@ -7,6 +7,7 @@ import pytest
 
 from iveg.domain.geometry import Rectangle
 from iveg.domain.observations import FeedbackRef, Observation, Origin, Received
+from iveg.domain.robot_state import Doubts
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.domain.world import World
 from tests.builders import at, fleet_of, odometry, origin, safety_report
@@ -191,3 +192,21 @@ def test_orions_answer_to_a_question_contradicts_nothing() -> None:
         robot.world.apply(Received(said, at(robot.now), FIWARE.id, asked=True))
 
     assert robot.doubts == ()
+
+
+# --- how long a doubt lasts ---------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("moments", "later", "doubted"),
+    [((1.0, 1.6), 2.5, ("jump",)), ((1.0, 1.6), 2.7, ()), ((1.0, 2.1, 3.2), 3.2, ())],
+    ids=["within a second", "after a second", "far apart are two beginnings"],
+)
+def test_a_doubt_ends_after_a_second_of_consistency(
+    moments: tuple[float, ...], later: float, doubted: tuple[str, ...]
+) -> None:
+    doubts = Doubts()
+    for moment in moments:
+        doubts.contradicted("jump", at(moment))
+
+    assert doubts.active(at(later)) == doubted
