@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
+from typing import Any
 
 from iveg.domain.observations import UNKNOWN_ORIGIN, CommandAnswer, Hold, Origin
 from iveg.domain.stop import (
@@ -57,28 +58,16 @@ class Bench:
     def report(
         self,
         *holds: Hold,
-        linear: float = 0.0,
-        angular: float = 0.0,
         factor: float = 0.0,
-        released: tuple[str, ...] = (),
         transport: TransportId = DIRECT.id,
-        challenge: str = CHALLENGE,
         sparse: bool = False,
+        **also: Any,
     ) -> list[Effect]:
-        """The robot reports; without holds named, what it would by itself."""
-        report = safety_report(
-            "AGI",
-            *holds,
-            linear=linear,
-            angular=angular,
-            speed_factor=factor,
-            released=released,
-            challenge=challenge,
-        )
+        """The robot reports its holds and ``also`` what a ``safety_report`` has."""
+        report = safety_report("AGI", *holds, speed_factor=factor, **also)
+        moment, new_id = at(self.now), self.new_id()
         return self.keep(
-            self.machine.reported(
-                report, at(self.now), transport, self.new_id(), sparse=sparse
-            )
+            self.machine.reported(report, moment, transport, new_id, sparse=sparse)
         )
 
     def answer(

@@ -5,13 +5,7 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.clocks import RobotClock
-from iveg.domain.observations import (
-    DetectionFrame,
-    Instant,
-    Odometry,
-    Origin,
-    SafetyReport,
-)
+from iveg.domain.observations import DetectionFrame, Instant, Odometry, Origin
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from tests.builders import at, origin
 
@@ -129,19 +123,6 @@ def test_one_wrong_stamp_costs_two_ages(off_s: float) -> None:
     assert robot.send(2.1) is None
     assert robot.send(2.2) == pytest.approx(0.0, abs=1e-6)
     assert robot.offset(2.2) == pytest.approx(0.0, abs=1e-6)
-
-
-def test_a_set_clock_is_found_though_messages_of_before_still_arrive() -> None:
-    robot = Robot()
-    robot.send_many(0.0, 20)
-    found = []
-    for number in range(5):
-        robot.ahead_s = -HOUR_S
-        found.append(robot.send(2.0 + 0.1 * number))
-        robot.ahead_s = 0.0
-        robot.send(1.9, 0.2 + 0.1 * number, kind=SafetyReport)
-
-    assert found == [None, *[pytest.approx(0.0, abs=1e-6)] * 4]
 
 
 def test_a_backlog_that_drains_at_once_ages_each_message_by_what_it_waited() -> None:

@@ -58,12 +58,8 @@ def test_a_beam_frees_its_way_and_takes_its_end(yaw: float) -> None:
     assert cost(costmap, 7.05, 5.05) == 0
     assert cost(costmap, 8.05, 5.05) > 0
     assert cost(costmap, 8.55, 5.05) == UNKNOWN
-
-
-def test_a_return_beyond_the_range_that_counts_frees_nothing() -> None:
-    costmap = seen(around(12.5, range_max=12.0), Pose2D(10.0, 5.0, 0.0))
-
-    assert (costmap.data == UNKNOWN).all()
+    beyond = seen(around(12.5, range_max=12.0), Pose2D(10.0, 5.0, yaw))
+    assert (beyond.data == UNKNOWN).all()
 
 
 @pytest.mark.parametrize("turn", [1, -1])

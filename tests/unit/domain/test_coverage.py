@@ -18,30 +18,20 @@ GREENHOUSE = Greenhouse(
 )
 
 
-def looking(seconds: float = 0.0) -> tuple[Scene, AisleCoverage]:
+def test_a_camera_sees_ahead_and_not_behind_or_through_the_crop_and_ages_grow() -> None:
     """AGI stands in the middle of aisle 1 and looks east."""
     scene, coverage = Scene(greenhouse=GREENHOUSE), AisleCoverage(GREENHOUSE)
     scene.drive("AGI", 4.0, linear=0.0)
     scene.look("AGI")
-    coverage.update(scene.world.live_robots(), at(seconds))
-    return scene, coverage
-
-
-def test_a_camera_sees_ahead_and_not_behind_or_through_the_crop() -> None:
-    _, coverage = looking()
+    coverage.update(scene.world.live_robots(), at(0.0))
 
     first, second = coverage.ages(at(3))
     assert first[:5] == [None] * 5
     assert first[6] == 3
     assert second == [None] * 12
-
-
-def test_ages_grow_and_what_was_looked_at_long_ago_is_not_seen_now() -> None:
-    _, coverage = looking()
-
+    assert coverage.ages(at(11))[0][6] == 11
     assert (coverage.share(at(1)) or 0.0) > 0.0
     assert coverage.share(at(11)) == 0.0
-    assert coverage.ages(at(11))[0][6] == 11
 
 
 def test_an_open_field_has_no_aisles_to_look_at() -> None:

@@ -42,14 +42,10 @@ def test_a_robot_slowed_twice_at_once_is_slowed_once() -> None:
     ]
 
     minutes = slowed_minutes(overlapping, GREENHOUSE, NOON + 1000.0)
-
     assert minutes == {("person", "2"): pytest.approx(1.5)}
 
-
-def test_a_slow_down_that_goes_on_counts_until_now() -> None:
-    open_ = decision_record(x=1.0, y=1.0, reason="person", started_at=NOON)
-
-    assert slowed_minutes([open_], GREENHOUSE, NOON + 30.0) == {("person", "1"): 0.5}
+    goes_on = decision_record(x=1.0, y=1.0, reason="person", started_at=NOON)
+    assert slowed_minutes([goes_on], GREENHOUSE, NOON + 30.0) == {("person", "1"): 0.5}
 
 
 def test_encounters_are_those_with_people_and_say_how_they_went() -> None:

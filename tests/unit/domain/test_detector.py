@@ -3,12 +3,7 @@
 import pytest
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.detector import (
-    FRAMES_HZ,
-    DetectorEvidence,
-    OutOfService,
-    flaw_of,
-)
+from iveg.domain.detector import FRAMES_HZ, DetectorEvidence, OutOfService, flaw_of
 from iveg.domain.observations import DetectionFrame, Origin
 from tests.builders import at
 

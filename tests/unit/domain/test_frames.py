@@ -95,16 +95,6 @@ def test_a_box_in_map_or_base_link_stays_as_it_is(name: str) -> None:
     assert (found.box, found.frame_id) == (BOX, name)
 
 
-def test_in_optical_axes_x_is_right_y_is_down_and_z_is_forward() -> None:
-    (found,) = boxes("camera_optical_frame", Box3D(0.1, 0.3, -1.2, 0.4, 2.0, 2.5))
-
-    assert found is not None
-    sides = found.box
-    assert (sides.xmin, sides.xmax) == pytest.approx((2.4, 2.9))
-    assert (sides.ymin, sides.ymax) == pytest.approx((-0.3, -0.1))
-    assert (sides.zmin, sides.zmax) == pytest.approx((0.2, 1.8))
-
-
 def test_the_box_of_a_turned_camera_keeps_its_turned_centre() -> None:
     turned = replace(AGI, camera=Pose2D(0.2, 0.1, math.pi / 4))
 

@@ -14,19 +14,6 @@ BOX = Rectangle(1.0, 1.0, 2.0, 3.0)
 
 
 @pytest.mark.parametrize(
-    ("segment", "crosses"),
-    [
-        ((0, 2, 3, 2), True), ((0, 0, 3, 0.9), False), ((0.5, 0, 0.5, 4), False),
-        ((1.5, 2, 1.6, 2.1), True), ((0, 2, 2, 4), True), ((0, 2, 0.9, 2), False),
-    ],
-)  # fmt: skip
-def test_a_segment_crosses_a_rectangle_or_passes_it(
-    segment: tuple[float, float, float, float], crosses: bool
-) -> None:
-    assert BOX.crosses(*segment) is crosses
-
-
-@pytest.mark.parametrize(
     ("x", "y", "margin", "inside"),
     [(1.0, 3.0, 0.0, True), (0.9, 2.0, 0.0, False), (0.9, 2.0, 0.2, True)],
 )
@@ -41,6 +28,7 @@ def test_crop_hides_what_is_behind_it() -> None:
 
     assert not greenhouse.in_sight(0, 2, 5, 2)
     assert greenhouse.in_sight(0, 5, 5, 5)
+    assert greenhouse.in_sight(0, 0, 3, 0.9), "past its corner"
 
 
 def test_a_scan_keeps_the_returns_that_count_and_turns_with_its_mount() -> None:

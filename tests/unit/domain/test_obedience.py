@@ -8,15 +8,7 @@ from iveg.domain.alerts import of_ignored
 from iveg.domain.feedback import CLEAR, HALF_SPEED, SpeedLimit
 from iveg.domain.robot_state import Obedience, allowed_s
 from iveg.domain.world import World
-from tests.builders import (
-    AGI,
-    at,
-    fleet_of,
-    odometry,
-    origin,
-    received,
-    safety_report,
-)
+from tests.builders import AGI, at, fleet_of, odometry, origin, received, safety_report
 
 PERSON = SpeedLimit(HALF_SPEED, "person", "P1", 1.2, "d-1")
 STALE = SpeedLimit(HALF_SPEED, "stale", "AGI")

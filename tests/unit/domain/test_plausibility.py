@@ -26,6 +26,12 @@ def say(
     world.apply(received(one, after=moment))
 
 
+def codes(world: World) -> set[str]:
+    """What was contradicted so far."""
+    found = (name.partition(".") for name in world.counters)
+    return {code for kind, _, code in found if kind == "contradicted"}
+
+
 @pytest.mark.parametrize(
     ("x", "linear", "angular", "found"),
     [
@@ -54,9 +60,3 @@ def test_no_robot_goes_farther_than_its_drive_takes_it(
     say(world, 0.0)
     say(world, 0.1, x, stamp=stamp)
     assert codes(world) == found
-
-
-def codes(world: World) -> set[str]:
-    """What was contradicted so far."""
-    found = (name.partition(".") for name in world.counters)
-    return {code for kind, _, code in found if kind == "contradicted"}

@@ -7,54 +7,20 @@ import pytest
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.observations import Instant
 from iveg.domain.tracking.people import People
+from tests.builders import at
 from tests.unit.domain.scene import Scene, person
-
-ON = DetectionRule(possible_people=True)
-OFF = DetectionRule(possible_people=False)
-LOOK_S = 0.3
-
-
-def looked(
-    scene: Scene, *chances: float, every_s: float = LOOK_S, x: float = 5.0
-) -> None:
-    """AGI looks at somebody, each time this sure."""
-    for chance in chances:
-        scene.now += every_s
-        scene.drive("AGI", 0.0)
-        scene.look("AGI", person(x, probability=chance))
-
-
-def test_a_weak_box_moves_no_ring_of_a_sure_one() -> None:
-    scene = Scene(rule=ON)
-    looked(scene, 0.85)
-    looked(scene, 0.55, x=5.5)
-
-    (somebody,) = scene.everyone
-    assert sorted((one.x, one.possible) for one in somebody.sightings) == [
-        (5.0, False),
-        (5.5, True),
-    ]
 
 
 def test_a_sure_box_takes_the_place_of_weak_ones() -> None:
-    scene = Scene(rule=ON)
-    looked(scene, 0.85, 0.55)
-    looked(scene, 0.9, x=5.5)
+    scene = Scene(rule=DetectionRule(possible_people=True))
+    for x, chance in ((5.0, 0.85), (5.0, 0.55), (5.5, 0.9)):
+        scene.now += 0.3
+        scene.drive("AGI", 0.0)
+        scene.look("AGI", person(x, probability=chance))
 
     (somebody,) = scene.everyone
     assert [(one.x, one.possible) for one in somebody.sightings] == [(5.5, False)]
-
-
-def test_where_a_weak_box_stands_no_sure_ring_is_cleared() -> None:
-    scene = Scene(rule=ON)
-    looked(scene, 0.85)
-    for _ in range(30):
-        looked(scene, 0.55, every_s=0.1)
-
-    (somebody,) = scene.everyone
-    assert {one.possible for one in somebody.sightings} == {False, True}
 
 
 # --- beyond the walls -------------------------------------------------------------
@@ -90,7 +56,7 @@ def test_the_zone_of_a_doubtful_person_lies_round_who_saw_them() -> None:
 
     assert speed_limits["AGI"].reason == "person"
     assert speed_limits["AGII"].reason == "person"
-    ((look, radius),) = scene.everyone[0].zone_radii(scene.rule, look_now(scene))
+    ((look, radius),) = scene.everyone[0].zone_radii(scene.rule, at(scene.now))
     assert (look.x, look.y, radius) == (10.0, 10.0, 8.0)
 
 
@@ -103,7 +69,3 @@ def test_a_doubtful_person_takes_nobody_s_place() -> None:
 
     places = sorted((one.newest.reach_m > 0.0, one.newest.x) for one in scene.everyone)
     assert places == [(False, 10.6), (True, 10.0)]
-
-
-def look_now(scene: Scene) -> Instant:
-    return scene.everyone[0].newest.at

@@ -1,8 +1,6 @@
 """The moments before which rows may go, whatever the clock shows."""
 
-import pytest
-
-from iveg.domain.retention import DAY_S, Retention, cutoff
+from iveg.domain.retention import DAY_S, Retention
 
 TODAY = 19_000
 NOW = (TODAY + 0.5) * DAY_S
@@ -23,12 +21,3 @@ def test_where_every_day_was_recorded_horizons_are_those_of_the_calendar() -> No
 def test_what_is_kept_for_ever_or_was_never_written_has_no_moment() -> None:
     assert Retention(0, 0, 0, 0).cutoffs(NOW, EVERY_DAY) == {}
     assert Retention().cutoffs(NOW, ()) == {}
-
-
-@pytest.mark.parametrize("years", [1, 5, 200])
-def test_a_clock_that_is_years_ahead_takes_three_days_and_no_more(years: int) -> None:
-    ahead = TODAY + years * 365
-    recorded = (ahead, *EVERY_DAY)
-
-    assert cutoff(7, ahead * DAY_S + 1.0, recorded) == (TODAY - 3) * DAY_S
-    assert cutoff(365, ahead * DAY_S + 1.0, recorded) == (TODAY - 361) * DAY_S

@@ -24,8 +24,13 @@ OBSTACLE = {
     "report": safety_report("AGI", speed_factor=0.5, reason="obstacle"),
     "near": LASER,
 }
+LOST = {"link": "LOST", "age_s": 4.0, "stop": "UNCONFIRMED"}
 FALLING: list[tuple[str, dict[str, Any]]] = [
     ("disobeys", {"alerts": alerts("person_not_slowing", "another_iveg")}),
+    (
+        "lost_moving",
+        {"alerts": alerts("moving_robot_lost", "stop_unconfirmed"), **LOST},
+    ),
     ("stop_failed", {"alerts": alerts("another_iveg"), "stop": "UNCONFIRMED"}),
     ("stop_unknown", {"alerts": alerts("another_iveg"), "stop": "STALE"}),
     ("stop_under_way", {"alerts": alerts("another_iveg"), "stop": "SENT"}),
@@ -53,13 +58,6 @@ def test_the_alerts_of_situations_stand_in_their_order() -> None:
     places = [list(ORDER).index(kind) for kind, *_ in ALERTED.values()]
 
     assert places == sorted(places)
-
-
-def test_lost_while_moving_comes_before_a_stop_that_nobody_confirms() -> None:
-    lost = {"link": "LOST", "age_s": 4.0, "stop": "UNCONFIRMED"}
-    both = alerts("moving_robot_lost", "stop_unconfirmed")
-
-    assert situation_of(facts(**lost, alerts=both)).kind == "lost_moving"
 
 
 def test_a_doubt_that_is_told_first_has_the_colour_of_what_is_graver() -> None:

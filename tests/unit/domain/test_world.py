@@ -193,13 +193,8 @@ def test_where_a_robot_proves_ages_only_a_proof_of_its_present_boot_acts(
     world.apply(one)
 
     assert world.may_act(one) is may_act
-
-
-def test_an_answer_acts_for_it_names_its_order() -> None:
-    world = world_that_told(0.0)
-    answer = CommandAnswer("AGI", echoing(1, heard=None), "01STOP", "LATCHED")
-
-    assert world.may_act(received(answer))
+    answer = CommandAnswer("AGI", of_now, "01STOP", "LATCHED")
+    assert world.may_act(received(answer)), "it names its order"
 
 
 def test_a_robot_that_moves_is_a_hazard_though_nobody_knows_how_old_its_pose_is() -> (

@@ -8,7 +8,7 @@ import pytest
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.observations import Navigation, Odometry
+from iveg.domain.observations import Odometry
 from iveg.domain.parameters import ByClass
 from iveg.domain.rule.foresight import Encounter, look_ahead
 from iveg.domain.rule.zones import zones_of
@@ -30,12 +30,9 @@ class Ahead:
         """A picture of AGII, and where both robots are."""
         self._seq += 1
         stamp = origin(self._seq, after=self.scene.now)
-        for name, pose, twist in (
-            ("AGI", self.pose, self.twist),
-            ("AGII", Pose2D(50.0, 0.0, 0.0), Twist2D(0.0, 0.0)),
-        ):
-            said = Odometry(name, stamp, pose, twist)
-            self.scene.world.apply(received(said, after=self.scene.now))
+        said = Odometry("AGI", stamp, self.pose, self.twist)
+        self.scene.world.apply(received(said, after=self.scene.now))
+        self.scene.drive("AGII", 50.0, linear=0.0)
         self.scene.look("AGII", *(person(x, y) for x, y in people))
         return self
 
@@ -46,10 +43,8 @@ class Ahead:
             self.see((x + vx * tenth / 10, y + vy * tenth / 10))
         return self
 
-    def plan(self, *path: tuple[float, float], age_s: float = 0.0) -> "Ahead":
-        said = Navigation("AGI", origin(1), "work", path[-1], path)
-        heard = received(said, after=self.scene.now - age_s)
-        self.scene.world.apply(heard)
+    def plan(self, *path: tuple[float, float]) -> "Ahead":
+        self.scene.navigate("AGI", "work", path)
         return self
 
     def foretold(self, *, speed_before: float | None = None) -> Encounter | None:

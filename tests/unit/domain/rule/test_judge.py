@@ -119,11 +119,8 @@ def test_a_limit_is_told_to_be_over_between_its_end_and_the_release() -> None:
 
 
 def test_a_limit_with_one_of_two_reasons_left_is_not_over() -> None:
-    scene = Scene(rule=RINGS)
-    scene.drive("AGI", 0.0)
-    scene.drive("AGII", 50.0)
+    scene = watching(Scene(rule=RINGS))
     scene.look("AGII", person(1.0), person(-1.0, 1.0))
-    scene.look("AGI")
     scene.judge()
     scene.drive("AGI", 2.0)
     told = scene.judge()["AGI"]

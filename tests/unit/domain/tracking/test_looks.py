@@ -1,6 +1,5 @@
 """Looks at one person add up to a probability, and their absence counts against it."""
 
-import math
 from collections.abc import Sequence
 
 import pytest
@@ -32,19 +31,14 @@ class Robots:
         return [one for one in found if one is not None]
 
 
-def probability(*confidences: float) -> float:
-    """What so many independent looks come to, by Bayes' rule with an even prior."""
-    odds = math.prod(one / (1.0 - one) for one in confidences)
-    return odds / (1.0 + odds)
-
-
 def test_two_looks_are_surer_than_either() -> None:
     robots = Robots()
     robots.look([seen(0.68)], 0.0)
     (looks,) = robots.look([seen(0.75)], LOOK_S)
 
     assert (looks.count, looks.least, looks.most, looks.over_s) == (2, 0.68, 0.75, 0.3)
-    assert looks.probability == pytest.approx(probability(0.68, 0.75))
+    odds = 0.68 / 0.32 * 0.75 / 0.25
+    assert looks.probability == pytest.approx(odds / (1.0 + odds)), "by Bayes' rule"
 
 
 def test_pictures_of_one_moment_are_one_look_by_the_surest_of_them() -> None:
