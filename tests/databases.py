@@ -14,6 +14,8 @@ from sqlalchemy import Connection, MetaData, Table, insert
 from iveg.adapters.history.engine import sqlite_file, upgrade
 from iveg.adapters.history.recorder import Store
 from iveg.domain.accounts import Account, ApiToken, name_key
+from iveg.domain.records import Record
+from iveg.vital.record import Waiting
 
 
 def lay_history(database_url: str) -> None:
@@ -29,6 +31,13 @@ def _newest() -> bytes:
         file = Path(folder, "history.sqlite")
         upgrade(f"sqlite:///{file}")
         return file.read_bytes()
+
+
+def remember(database_url: str, *records: Record) -> None:
+    """Put rows into a history."""
+    store = Store(database_url)
+    store.write([Waiting(one, number, 0.0) for number, one in enumerate(records, 1)])
+    store.close()
 
 
 def put_into_tables(url: str, person: Account, program: ApiToken) -> None:

@@ -1,4 +1,3 @@
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -7,11 +6,10 @@ import pytest
 from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Cursor, Filter, read_cursor, write_cursor
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.recorder import Store
 from iveg.adapters.history.series import AIR, SPEEDS, confidence_counts, series_of
 from iveg.domain.errors import UnreadableError
 from iveg.domain.records import DetectionRecord, Record
-from iveg.vital.record import Waiting
+from tests.databases import remember
 from tests.fakes.records import (
     NOON,
     alert_record,
@@ -22,20 +20,6 @@ from tests.fakes.records import (
     log_record,
     odometry_record,
 )
-
-
-def remember(database_url: str, *records: Record) -> None:
-    store = Store(database_url)
-    store.write([Waiting(record, n, 0.0) for n, record in enumerate(records, 1)])
-    store.close()
-
-
-@pytest.fixture
-def queries(database_url: str) -> Iterator[Queries]:
-    remember(database_url)
-    asked = Queries(database_url)
-    yield asked
-    asked.close()
 
 
 async def detections(queries: Queries, asked: Filter) -> list[DetectionRecord]:

@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters.history.engine import sqlite_url, upgrade
-from iveg.adapters.history.recorder import Store
-from iveg.vital.record import Waiting
+from tests.databases import remember
 from tests.fakes.records import NOON, audit_record
 
 DUMP = Path(__file__).parents[2] / "data" / "part_days.sql"
@@ -73,9 +72,7 @@ def test_the_rows_are_all_there_and_only_dropped_tables_and_columns_are_gone(
 
 
 def test_the_audit_goes_on_behind_its_rows_and_stays_guarded(file: Path) -> None:
-    store = Store(sqlite_url(file))
-    store.write([Waiting(audit_record(audit_id="U4", at=NOON + 9.0), 1, 0.0)])
-    store.close()
+    remember(sqlite_url(file), audit_record(audit_id="U4", at=NOON + 9.0))
 
     with closing(sqlite3.connect(file)) as connection:
         seqs = connection.execute("SELECT seq, audit_id FROM audit ORDER BY seq")
