@@ -2,10 +2,13 @@
 
 import os
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
+from iveg.adapters.history.engine import upgrade
+from iveg.adapters.history.queries import Queries
 from tests.databases import lay_history
 from tests.fakes.postgresql import PostgreSQL, programs, running_postgresql
 
@@ -45,3 +48,10 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     url = f"sqlite:///{tmp_path / 'history.db'}"
     lay_history(url)
     return url
+
+
+@pytest.fixture
+def queries(database_url: str) -> Iterator[Queries]:
+    upgrade(database_url)
+    with closing(Queries(database_url)) as queries:
+        yield queries

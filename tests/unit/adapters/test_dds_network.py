@@ -5,13 +5,7 @@ import pytest
 from iveg.adapters import dds_network
 from iveg.adapters.dds_network import DdsNetwork, used_of
 
-MACHINE = {
-    "lo": "127.0.0.1",
-    "iveg0": "192.0.2.1",
-    "iveg1": "192.0.2.2",
-    "iveg2": "192.0.2.3",
-    "iveg3": "192.0.2.4",
-}
+MACHINE = {"lo": "127.0.0.1"} | {f"iveg{n}": f"192.0.2.{n + 1}" for n in range(4)}
 
 
 @pytest.fixture(autouse=True)
@@ -20,9 +14,9 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_as_many_interfaces_as_cyclone_takes_are_used_and_loopback_last() -> None:
-    assert list(used_of(DdsNetwork().interfaces())) == [
-        "iveg0", "iveg1", "iveg2", "lo"
-    ]  # fmt: skip
+    used = list(used_of(DdsNetwork().interfaces()))
+
+    assert used == ["iveg0", "iveg1", "iveg2", "lo"]
 
 
 @pytest.mark.parametrize(

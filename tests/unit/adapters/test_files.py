@@ -89,23 +89,15 @@ def test_room_for_a_megabyte_more_is_taken_from_the_disk_ahead(path: Path) -> No
     assert path.stat().st_size == notes.size
 
 
-def test_lines_that_the_disk_did_not_take_are_in_no_part_there(path: Path) -> None:
+def test_what_the_disk_did_not_take_is_in_no_part_there_and_the_file_goes_on(
+    path: Path,
+) -> None:
     notes = ReservedFile(path, FORM)
     notes.append(b'"first"\n')
     size = path.stat().st_size
 
     with files_no_longer_than(size), pytest.raises(OSError, match=r"written|large"):
         notes.append(b"1\n" * size)
-
-    notes.append(b'"second"\n')
-    notes.close()
-    assert lines_of(path) == [b'"first"', b'"second"']
-
-
-def test_a_file_that_cannot_be_rewritten_stands(path: Path) -> None:
-    notes = ReservedFile(path, FORM)
-    notes.append(b'"first"\n')
-
     with files_no_longer_than(RESERVE_BYTES), pytest.raises(OSError, match="large"):
         notes.rewrite(b'"new"\n')
 

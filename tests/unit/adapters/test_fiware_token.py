@@ -3,7 +3,6 @@
 import asyncio
 import time
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 
 import pytest
 
@@ -29,30 +28,25 @@ class Place:
         self.grant = TokenGrant(f"{url}/oauth2/token", CLIENT, SECRET)
         self.use(self.grant)
 
-    def use(self, grant: TokenGrant, agent_url: str = "") -> None:
+    def use(self, grant: TokenGrant) -> None:
         """Ask for a token like this from now on."""
         http = BoundedJson(HOP, timeout_s=2.0)
         self.token = FiwareToken(grant, lambda: self.clock().mono, http)
         self.orion = OrionClient(self.url, *TENANT, self.token)
-        self.agent = IotAgentClient(agent_url or self.url, *TENANT, self.token)
-
-
-@asynccontextmanager
-async def place_of(behind: str) -> AsyncIterator[Place]:
-    clock = FakeClock()
-    pep = FakePepProxy(behind, lambda: clock().mono)
-    async with served(pep.app()) as url:
-        place = Place(pep, url, clock)
-        yield place
-        pep.is_released.set()
-        await place.orion.close()
-        await place.agent.close()
+        self.agent = IotAgentClient(self.url, *TENANT, self.token)
 
 
 @pytest.fixture
 async def place() -> AsyncIterator[Place]:
-    async with embedded_fiware() as fiware, place_of(fiware.orion_url) as made:
-        yield made
+    clock = FakeClock()
+    async with embedded_fiware() as fiware:
+        pep = FakePepProxy(fiware.orion_url, lambda: clock().mono)
+        async with served(pep.app()) as url:
+            place = Place(pep, url, clock)
+            yield place
+            pep.is_released.set()
+            await place.orion.close()
+            await place.agent.close()
 
 
 @pytest.mark.parametrize("header", ["Authorization", "X-Auth-Token"])
@@ -121,20 +115,14 @@ async def test_a_token_that_was_revoked_is_replaced_once_for_all_who_ask(
     assert place.pep.seen[-5:] == [("token-2", 200)] * 5
 
 
-@pytest.mark.parametrize("times", [1, 20])
 async def test_a_proxy_that_refuses_every_token_is_told_as_such_and_not_flooded(
-    place: Place, times: int
+    place: Place,
 ) -> None:
     place.pep.life_s = 0.0  # over as soon as given: 401 to each
-    errors = []
-    for _ in range(times):
-        with pytest.raises(HopError) as refused:
+    for _ in range(20):
+        with pytest.raises(HopError, match="401 to GET /version: Invalid token: acc"):
             await place.orion.version()
-        errors.append(refused.value.detail)
 
-    assert set(errors) == {
-        "401 to GET /version: Invalid token: access token is invalid"
-    }
     assert len(place.pep.forms) == 2
 
 

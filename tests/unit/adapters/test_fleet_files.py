@@ -47,10 +47,8 @@ def test_what_the_file_says_of_a_robot_is_what_is_known_of_it() -> None:
 
 
 def test_frames_and_classes_of_a_robot_are_what_its_messages_name() -> None:
-    said = (
-        'pose_frame = "odom"\nclasses = """\nperson\ntractor\n"""\ncamera = { frame = '
-    )
-    text = ONE.replace("camera = { ", said + '"zed_link", ')
+    said = 'pose_frame = "odom"\nclasses = """\nperson\ntractor\n"""\n'
+    text = ONE.replace("camera = { ", said + 'camera = { frame = "zed_link", ')
 
     one = read_fleet(text, "").of_robot("B2")
 
@@ -61,9 +59,7 @@ def test_frames_and_classes_of_a_robot_are_what_its_messages_name() -> None:
 def test_a_class_list_of_unsure_form_is_refused_by_its_line() -> None:
     text = ONE.replace("camera =", 'classes = """\n1: person\n"""\ncamera =')
 
-    refused = complaint(text)
-
-    assert refused.startswith("fleet.toml, robots[1].classes: line 1 has")
+    assert complaint(text).startswith("fleet.toml, robots[1].classes: line 1 has")
 
 
 def test_margins_never_count_on_better_brakes_than_the_drive_has() -> None:
@@ -89,25 +85,17 @@ def test_what_is_wrong_is_named_by_file_and_key(old: str, new: str, place: str) 
     assert complaint(ONE.replace(old, new)).startswith(place)
 
 
-def test_without_a_word_the_fleet_is_everybody_in_the_file(tmp_path: Path) -> None:
-    file = tmp_path / "fleet.toml"
-    file.write_text(ONE)
-
-    assert load_fleet(str(file)).ids == ("B1", "B2")
-    assert load_fleet().ids == ("AGI", "AGII")
-
-
 def test_words_choose_who_is_in_the_fleet_and_what_plays(tmp_path: Path) -> None:
     file = tmp_path / "fleet.toml"
     file.write_text(ONE)
 
+    everybody = load_fleet(str(file))
     fleet = load_fleet(str(file), ("B1:live", "AGII", "D1:recording"))
 
+    assert everybody.ids == ("B1", "B2")
     assert fleet.ids == ("B1", "AGII", "D1")
-    assert (fleet.of_robot("B1").kind, fleet.of_robot("B1").profile.length) == (
-        "live",
-        1.1,
-    )
+    b1 = fleet.of_robot("B1")
+    assert (b1.kind, b1.profile.length) == ("live", 1.1)
     assert fleet.of_robot("AGII") == built_in().of_robot("AGII")
     assert fleet.of_robot("D1") == RobotDescription("D1", "recording")
 

@@ -23,12 +23,6 @@ ymax = 3
 """
 
 
-def complaint(text: str) -> str:
-    with pytest.raises(DataFileError) as refused:
-        read_greenhouse(text, "shed.toml")
-    return str(refused.value)
-
-
 def test_the_testbed_of_the_paper_has_five_corridors_four_metres_apart() -> None:
     greenhouse = load_greenhouse("mvsim-20x20")
     corridors = [lane for lane in greenhouse.lanes if lane.label.startswith("Pasillo")]
@@ -50,13 +44,6 @@ def test_agroconnect_has_the_papers_aisles_and_its_1850_square_metres() -> None:
     assert (bounds.xmax - bounds.xmin) * (bounds.ymax - bounds.ymin) == 1850.0
 
 
-def test_crop_hides_one_corridor_from_the_next() -> None:
-    greenhouse = load_greenhouse("mvsim-20x20")
-
-    assert not greenhouse.in_sight(10.0, 10.0, 14.0, 10.0)
-    assert greenhouse.in_sight(10.0, 5.0, 10.0, 15.0)
-
-
 def test_an_open_field_holds_every_position_of_the_wire_and_nothing_else() -> None:
     greenhouse = load_greenhouse("none")
 
@@ -65,18 +52,16 @@ def test_an_open_field_holds_every_position_of_the_wire_and_nothing_else() -> No
     assert greenhouse.lanes == ()
 
 
-def test_a_users_file_is_read_from_disk(tmp_path: Path) -> None:
+def test_a_users_file_is_read_and_a_missing_one_is_told_with_the_names_that_exist(
+    tmp_path: Path,
+) -> None:
     file = tmp_path / "shed.toml"
     file.write_text(SMALL, "utf-8")
 
     greenhouse = load_greenhouse(str(file))
 
-    assert greenhouse.name == "shed"
-    assert len(greenhouse.rows) == 2
+    assert (greenhouse.name, len(greenhouse.rows)) == ("shed", 2)
     assert greenhouse.lanes[0].label == "Pasillo 1"
-
-
-def test_a_missing_file_is_refused_with_the_names_that_exist() -> None:
     with pytest.raises(DataFileError, match="agroconnect"):
         load_greenhouse("no-such-house")
 
@@ -93,4 +78,7 @@ def test_a_missing_file_is_refused_with_the_names_that_exist() -> None:
 def test_what_cannot_be_is_refused_with_file_and_field(
     right: str, wrong: str, said: str
 ) -> None:
-    assert complaint(SMALL.replace(right, wrong)).startswith(f"shed.toml, {said}")
+    with pytest.raises(DataFileError) as refused:
+        read_greenhouse(SMALL.replace(right, wrong), "shed.toml")
+
+    assert str(refused.value).startswith(f"shed.toml, {said}")

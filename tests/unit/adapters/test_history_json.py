@@ -1,22 +1,15 @@
 """What is JSON is kept as JSON, also what the version before kept as a text."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 
 import pytest
 from alembic import command
-from sqlalchemy import Connection, text
+from sqlalchemy import text
 
 from iveg.adapters.history import lists
 from iveg.adapters.history.engine import alembic_config, upgrade, writing_engine
 from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.recorder import Store
-from iveg.vital.record import Waiting
-from tests.fakes.records import (
-    NOON,
-    log_record,
-)
 
 BEFORE = "keep_readings"
 OLD_ROWS = (
@@ -38,17 +31,20 @@ OLD_ROWS = (
     " 1700000000.223456, 1700000000.133457, 1700000000.153, 1, 1)",
     "INSERT INTO log (id, at, kind, key, slots) VALUES "
     "(1, 1.0, 'speed', 'log.speed_up', '{\"robot\": \"Túnel\"}'), "
-    "(2, 2.0, 'speed', 'log.speed_up', '{\"factor\": NaN}')",
+    "(2, 2.0, 'speed', 'log.speed_up', '{\"factor\": NaN}'), "
+    "(3, 3.0, 'speed', 'log.speed_up', '[\"a list\"]')",
 )
 
 
 @pytest.fixture
 def old(empty_url: str) -> str:
-    """A history that the version before wrote, one row of it spoilt."""
-    with connected(empty_url) as connection:
+    """A history that the version before wrote, with rows that are spoilt."""
+    engine = writing_engine(empty_url)
+    with engine.begin() as connection:
         command.upgrade(alembic_config(connection), BEFORE)
         for row in OLD_ROWS:
             connection.execute(text(row.replace(":", "\\:")))
+    engine.dispose()
     return empty_url
 
 
@@ -67,7 +63,7 @@ async def test_rows_of_the_version_before_read_as_values(
     [decision] = (await queries.page(lists.DECISIONS, Filter())).items
     [unboxed, boxed] = (await queries.page(lists.DETECTIONS, Filter())).items
     [alert] = (await queries.page(lists.ALERTS, Filter())).items
-    [spoilt, line] = (await queries.page(lists.LOG, Filter())).items
+    [another, spoilt, line] = (await queries.page(lists.LOG, Filter())).items
     [order] = (await queries.page(lists.COMMANDS, Filter())).items
     assert order.sent_at == {"fiware": 1700000000.223456, "direct": 1700000000.133457}
     assert order.answer_at == {"direct": 1700000000.153}
@@ -76,25 +72,5 @@ async def test_rows_of_the_version_before_read_as_values(
     assert (boxed.transport, unboxed.transport) == ("direct", "fiware")
     assert (boxed.box, unboxed.box) == ({"xmin": -4.0, "frame_id": "map"}, None)
     assert alert.slots == {"robot": "AGI"}
-    assert (line.slots, spoilt.slots) == ({"robot": "Túnel"}, {})
-
-
-async def test_a_row_whose_json_has_another_shape_hides_no_other(
-    empty_url: str, queries: Queries
-) -> None:
-    store = Store(empty_url)
-    rows = log_record(id=2, slots=["a list"]), log_record()
-    store.write([Waiting(record, n, 0.0) for n, record in enumerate(rows, 1)])
-    store.close()
-
-    lines = (await queries.page(lists.LOG, Filter(since=NOON))).items
-    assert sorted(len(line.slots) for line in lines) == [0, 1]
-
-
-@contextmanager
-def connected(empty_url: str) -> Iterator[Connection]:
-    """A transaction of its own."""
-    engine = writing_engine(empty_url)
-    with engine.begin() as connection:
-        yield connection
-    engine.dispose()
+    assert line.slots == {"robot": "Túnel"}
+    assert spoilt.slots == another.slots == {}

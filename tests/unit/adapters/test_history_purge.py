@@ -1,7 +1,8 @@
 """What leaves the history when its time is over, and what never does."""
 
 import asyncio
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,13 +12,12 @@ from iveg.adapters.history import lists, upkeep
 from iveg.adapters.history.engine import upgrade, writing_engine
 from iveg.adapters.history.lists import Filter
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.recorder import Store
 from iveg.adapters.history.series import people_seen
 from iveg.adapters.history.tables import TABLE_MAPPINGS
 from iveg.adapters.history.upkeep import purge_piece, recorded_days
 from iveg.domain.records import ReadingRecord, Record
 from iveg.domain.retention import DAY_S, PURGE_STEPS, PurgeStep
-from iveg.vital.record import Waiting
+from tests.databases import remember
 from tests.fakes.records import (
     NOON,
     alert_record,
@@ -64,25 +64,12 @@ def everything(at: float, mark: str) -> list[Record]:
     ]
 
 
-def write(database_url: str, records: Sequence[Record]) -> None:
-    store = Store(database_url)
-    store.write([Waiting(one, number, 0.0) for number, one in enumerate(records)])
-    store.close()
-
-
 @pytest.fixture
 def engine(database_url: str) -> Iterator[Engine]:
     upgrade(database_url)
     engine = writing_engine(database_url)
     yield engine
     engine.dispose()
-
-
-@pytest.fixture
-def queries(database_url: str) -> Iterator[Queries]:
-    queries = Queries(database_url)
-    yield queries
-    queries.close()
 
 
 def run(engine: Engine, step: PurgeStep, before: float) -> int:
@@ -104,11 +91,8 @@ def test_every_table_is_kept_for_a_time_that_is_told() -> None:
 def test_each_step_takes_what_is_older_and_nothing_of_that_moment_or_younger(
     engine: Engine, database_url: str
 ) -> None:
-    ages = (OLD - 1.0, OLD, OLD + 1.0)
-    write(
-        database_url,
-        [one for n, at in enumerate(ages) for one in everything(at, f"M{n}")],
-    )
+    for mark, at in enumerate((OLD - 1.0, OLD, OLD + 1.0)):
+        remember(database_url, *everything(at, f"M{mark}"))
 
     # Of the audit: test_history_audit.
     steps = [one for one in PURGE_STEPS if one.table != "audit"]
@@ -116,16 +100,14 @@ def test_each_step_takes_what_is_older_and_nothing_of_that_moment_or_younger(
         assert run(engine, step, OLD) == 1, step
         assert run(engine, step, OLD) == 0
 
-    assert {step.table: rows(engine, step.table) for step in steps} == (
-        dict.fromkeys((step.table for step in steps), 2)
-    )
+    assert {rows(engine, step.table) for step in steps} == {2}
     assert rows(engine, "detections", "count(x)") == 2
 
 
 async def test_places_go_and_all_else_of_the_rows_stays(
     engine: Engine, database_url: str, queries: Queries
 ) -> None:
-    write(database_url, everything(OLD - 1.0, "M"))
+    remember(database_url, *everything(OLD - 1.0, "M"))
     [decided] = (await queries.page(lists.DECISIONS, Filter())).items
     [seen] = (await queries.page(lists.DETECTIONS, Filter())).items
     [told] = (await queries.page(lists.LOG, Filter())).items
@@ -136,30 +118,23 @@ async def test_places_go_and_all_else_of_the_rows_stays(
     [decision] = (await queries.page(lists.DECISIONS, Filter())).items
     [detection] = (await queries.page(lists.DETECTIONS, Filter())).items
     [line] = (await queries.page(lists.LOG, Filter())).items
-    assert (decision.x, decision.y, decision.z) == (None, None, None)
-    assert decision.rule_parameters == {"radius_m": 2.0}
-    assert (decision.distance_m, decision.links) == (decided.distance_m, decided.links)
-    assert (detection.x, detection.y, detection.z, detection.box) == (None,) * 4
-    assert (detection.class_id, detection.probability) == (
-        seen.class_id,
-        seen.probability,
+    assert decision == replace(
+        decided, x=None, y=None, z=None, rule_parameters={"radius_m": 2.0}
     )
-    assert line.slots == {"robot": "AGI", "confidence": 0.9}
-    assert (line.key, line.at) == (told.key, told.at)
+    assert detection == replace(seen, x=None, y=None, z=None, box=None)
+    assert line == replace(told, slots={"robot": "AGI", "confidence": 0.9})
     assert await queries.ask(people_seen, 0.0, NOON) == ()
 
 
 async def test_what_goes_on_is_kept_whatever_their_age(
     engine: Engine, database_url: str
 ) -> None:
-    write(
-        database_url,
-        [
-            decision_record(started_at=OLD, ended_at=None),
-            alert_record(raised_at=OLD, last_raised_at=OLD, cleared_at=None),
-            command_record(command_id="held", requested_at=OLD, state="STANDING"),
-        ],
-    )
+    rows = [
+        decision_record(started_at=OLD, ended_at=None),
+        alert_record(raised_at=OLD, last_raised_at=OLD, cleared_at=None),
+        command_record(command_id="held", requested_at=OLD, state="STANDING"),
+    ]
+    remember(database_url, *rows)
 
     for step in PURGE_STEPS:
         if step.kind == "decisions":
@@ -170,9 +145,9 @@ async def test_a_decision_that_is_written_again_loses_its_place_again(
     engine: Engine, database_url: str
 ) -> None:
     step = PurgeStep("positions", "decisions")
-    write(database_url, [decision_record(started_at=OLD)])
+    remember(database_url, decision_record(started_at=OLD))
     assert run(engine, step, NOON) == 1
-    write(database_url, [decision_record(started_at=OLD, ended_at=NOON)])
+    remember(database_url, decision_record(started_at=OLD, ended_at=NOON))
 
     assert run(engine, step, NOON) == 1
     assert rows(engine, "decisions", "x") is None
@@ -183,7 +158,7 @@ def test_a_damaged_row_does_not_hold_up_those_behind_it(
     tmp_path: Path, damaged: str
 ) -> None:
     url = f"sqlite:///{tmp_path / 'history.db'}"
-    write(url, [log_record(id=n, at=OLD + n, slots=PLACE) for n in (1, 2)])
+    remember(url, *[log_record(id=n, at=OLD + n, slots=PLACE) for n in (1, 2)])
     engine = writing_engine(url)
     with engine.begin() as connection:
         spoil = text("UPDATE log SET slots = :slots WHERE id = 1")
@@ -202,7 +177,7 @@ def test_a_piece_takes_the_oldest_and_whole_moments(
 ) -> None:
     monkeypatch.setattr(upkeep, "PIECE", 3)
     times = (0.0, 1.0, 2.0, 2.0, 3.0, 4.0)
-    write(database_url, [odometry_record(at=OLD + after) for after in times])
+    remember(database_url, *[odometry_record(at=OLD + after) for after in times])
 
     took = [run(engine, PurgeStep("telemetry", "odometry"), NOON) for _ in range(3)]
 
@@ -213,7 +188,9 @@ def test_days_of_the_log_are_found_newest_first(
     database_url: str, queries: Queries
 ) -> None:
     at = [0.5, 0.9, 1.5, 7.2, 7.9, 4000.1]
-    write(database_url, [log_record(id=n, at=day * DAY_S) for n, day in enumerate(at)])
+    remember(
+        database_url, *[log_record(id=n, at=day * DAY_S) for n, day in enumerate(at)]
+    )
 
     assert asyncio.run(queries.ask(recorded_days, 3)) == (4000, 7, 1)
     assert asyncio.run(queries.ask(recorded_days, 99)) == (4000, 7, 1, 0)

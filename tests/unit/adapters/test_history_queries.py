@@ -1,4 +1,3 @@
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -7,11 +6,10 @@ import pytest
 from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Cursor, Filter, read_cursor, write_cursor
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.recorder import Store
 from iveg.adapters.history.series import AIR, SPEEDS, confidence_counts, series_of
 from iveg.domain.errors import UnreadableError
 from iveg.domain.records import DetectionRecord, Record
-from iveg.vital.record import Waiting
+from tests.databases import remember
 from tests.fakes.records import (
     NOON,
     alert_record,
@@ -22,20 +20,6 @@ from tests.fakes.records import (
     log_record,
     odometry_record,
 )
-
-
-def remember(database_url: str, *records: Record) -> None:
-    store = Store(database_url)
-    store.write([Waiting(record, n, 0.0) for n, record in enumerate(records, 1)])
-    store.close()
-
-
-@pytest.fixture
-def queries(database_url: str) -> Iterator[Queries]:
-    remember(database_url)
-    asked = Queries(database_url)
-    yield asked
-    asked.close()
 
 
 async def detections(queries: Queries, asked: Filter) -> list[DetectionRecord]:
@@ -74,22 +58,18 @@ async def test_pages_hold_every_row_once_though_times_are_equal_and_rows_arrive(
     remember(database_url, detection_record(at=NOON + 99.0, x=99.0))
     rest = await detections(queries, Filter(limit=7, cursor=first.next))
 
-    assert [row.x for row in (*first.items, *rest)] == [float(n) for n in range(25)][
-        ::-1
-    ]
+    assert [*first.items, *rest] == rows[::-1]
 
 
 @pytest.mark.parametrize(
     ("asked", "xs"),
     [
         (Filter(robot="AGII"), [2.0]),
-        (Filter(class_="person"), [1.0]),
         (Filter(class_="farmer"), [1.0]),
         (Filter(class_="crate"), [2.0]),
         (Filter(min_probability=0.8), [1.0]),
         (Filter(min_probability=0.81), []),
         (Filter(person="P1"), [1.0]),
-        (Filter(robot="AGI", class_="crate"), []),
         (Filter(robot="AGI' OR 1=1 --"), []),
     ],
 )
@@ -110,14 +90,11 @@ async def test_filters_leave_what_was_asked_for(
 @pytest.mark.parametrize(
     "text",
     [
-        "",
-        "!",
         "é",
         "e30",
         "WzEsMl0",
         write_cursor(Cursor(NOON, "D1")),
         write_cursor(Cursor(NOON, 2**63)),
-        write_cursor(Cursor(NOON, -1)),
     ],
 )
 def test_a_cursor_of_nobody_or_of_another_list_is_refused(text: str) -> None:

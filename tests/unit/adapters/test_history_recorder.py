@@ -28,16 +28,16 @@ from tests.fakes.records import (
 )
 from tests.patience import PATIENCE_S, until
 
-EVERYTHING = (
-    alert_record(),
-    audit_record(),
-    command_event_record(),
-    command_record(),
-    decision_record(),
-    detection_record(),
-    log_record(),
-    odometry_record(),
-)
+EVERYTHING = {
+    "alerts": alert_record(),
+    "audit": audit_record(),
+    "command_events": command_event_record(),
+    "commands": command_record(),
+    "decisions": decision_record(),
+    "detections": detection_record(),
+    "log": log_record(),
+    "odometry": odometry_record(),
+}
 
 
 @asynccontextmanager
@@ -70,24 +70,12 @@ def scalar(database_url: str, query: str) -> object:
     return found
 
 
-TABLES = (
-    "alerts",
-    "audit",
-    "command_events",
-    "commands",
-    "decisions",
-    "detections",
-    "log",
-    "odometry",
-)
-
-
 def count(database_url: str, table: str) -> object:
     return scalar(database_url, f"SELECT count(*) FROM {table}")  # noqa: S608
 
 
 def counts(database_url: str) -> dict[str, object]:
-    return {table: count(database_url, table) for table in TABLES}
+    return {table: count(database_url, table) for table in EVERYTHING}
 
 
 def moved_aside(directory: Path) -> list[Path]:
@@ -114,7 +102,7 @@ async def test_everything_that_is_offered_is_stored(
     database_url: str, tmp_path: Path
 ) -> None:
     async with recording(database_url, tmp_path) as recorder:
-        for record in EVERYTHING:
+        for record in EVERYTHING.values():
             recorder.enqueue(record)
         await until(lambda: recorder.counters["history_written"] == len(EVERYTHING))
         assert state(recorder) == "ok"
@@ -129,7 +117,7 @@ async def test_while_the_database_is_locked_only_the_oldest_telemetry_is_lost(
     other = lock(sqlite_url)
     url = f"{sqlite_url}?timeout=0.2"
     async with recording(url, tmp_path, 10) as recorder:
-        for record in EVERYTHING:
+        for record in EVERYTHING.values():
             recorder.enqueue(record)
         for number in range(100):
             recorder.enqueue(odometry_record(at=NOON + number))
@@ -167,40 +155,26 @@ async def test_a_server_that_dies_is_missed_and_welcomed_back(
     assert count(postgresql_url, "odometry") == 1
 
 
-async def crash(database_url: str, path: Path, *records: Record) -> None:
-    """A run that ends when these are in the journal, and not in the database."""
-    crashed = Recorder(database_url, FileJournal(path))
-    for record in records:
-        crashed.enqueue(record)
-    await crashed.flushed()
-
-
-async def test_what_a_crash_left_in_the_journal_is_stored_at_the_next_start(
-    database_url: str, tmp_path: Path
-) -> None:
-    await crash(database_url, tmp_path / "commands.jsonl", command_record(state="SENT"))
-    upgrade(database_url)
-    assert count(database_url, "commands") == 0
-
-    async with recording(database_url, tmp_path) as recorder:
-        await asyncio.wait_for(recorder.caught_up(), PATIENCE_S)
-        assert scalar(database_url, "SELECT state FROM commands") == "SENT"
-
-
-async def test_a_journal_that_comes_back_overwrites_nothing_and_doubles_nothing(
+async def test_what_a_crash_left_is_stored_at_the_next_start_and_never_again(
     database_url: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "commands.jsonl"
     rows = command_record(state="REQUESTED"), command_event_record()
-    await crash(database_url, path, *rows)
+    crashed = Recorder(database_url, FileJournal(path))
+    for record in rows:
+        crashed.enqueue(record)
+    await crashed.flushed()
     old = path.read_bytes()
-    async with recording(database_url, tmp_path) as recorder:
-        recorder.enqueue(command_record(state="STANDING"))
-    path.write_bytes(old)
 
     async with recording(database_url, tmp_path) as recorder:
         await asyncio.wait_for(recorder.caught_up(), PATIENCE_S)
+        state_then = scalar(database_url, "SELECT state FROM commands")
+        recorder.enqueue(command_record(state="STANDING"))
+    path.write_bytes(old)
+    async with recording(database_url, tmp_path) as recorder:
+        await asyncio.wait_for(recorder.caught_up(), PATIENCE_S)
 
+    assert state_then == "REQUESTED"
     assert scalar(database_url, "SELECT state FROM commands") == "STANDING"
     assert count(database_url, "command_events") == 1
 
@@ -227,7 +201,7 @@ async def test_closing_while_the_database_is_away_leaves_orders_to_the_journal(
     other = lock(sqlite_url)
     journal = FileJournal(tmp_path / "commands.jsonl")
     recorder = Recorder(f"{sqlite_url}?timeout=0.1", journal)
-    for record in EVERYTHING:
+    for record in EVERYTHING.values():
         recorder.enqueue(record)
 
     await recorder.close()

@@ -1,17 +1,13 @@
 """The size of the history."""
 
 from iveg.adapters.history.queries import ask_once
-from iveg.adapters.history.recorder import Store
 from iveg.adapters.history.upkeep import TableStats, read_stats
-from iveg.vital.record import Waiting
+from tests.databases import remember
 from tests.fakes.records import NOON, odometry_record
 
 
 def test_each_table_is_counted_and_aged(database_url: str) -> None:
-    store = Store(database_url)
-    rows = [odometry_record(at=NOON + n) for n in range(600)]
-    store.write([Waiting(one, n, 0.0) for n, one in enumerate(rows)])
-    store.close()
+    remember(database_url, *(odometry_record(at=NOON + n) for n in range(600)))
 
     tables, size = ask_once(database_url, read_stats)
 

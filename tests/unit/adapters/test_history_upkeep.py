@@ -7,15 +7,15 @@ import pytest
 
 from iveg.adapters.history import upkeep
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.recorder import Recorder, Store
+from iveg.adapters.history.recorder import Recorder
 from iveg.adapters.history.upkeep import SETTLES_S, DiskWatch, HistoryUpkeep
 from iveg.adapters.journal import FileJournal
 from iveg.domain.errors import HopError
-from iveg.domain.records import AuditRecord, LogRecord, Record
+from iveg.domain.records import AuditRecord, LogRecord
 from iveg.domain.retention import DAY_S, DiskSpace, Retention
 from iveg.vital.audit import AuditTrail
-from iveg.vital.record import Waiting
 from tests.builders import START
+from tests.databases import remember
 from tests.fakes.records import detection_record, log_record, odometry_record
 from tests.unit.vital.desk import Desk
 
@@ -46,10 +46,7 @@ class Upkeep:
         days = [log_record(id=n, at=NOW - n * DAY_S) for n in range(60)]
         drives = [odometry_record(at=NOW - n * DAY_S) for n in (29, 31, 31)]
         seen = [detection_record(at=NOW - n * DAY_S) for n in (6, 8)]
-        store = Store(url)
-        rows: list[Record] = [*days, *drives, *seen]
-        store.write([Waiting(one, number, 0.0) for number, one in enumerate(rows)])
-        store.close()
+        remember(url, *days, *drives, *seen)
 
     async def _drop(self) -> bool:
         self.recordings -= 1

@@ -146,19 +146,6 @@ async def test_publishing_while_away_fails_loudly() -> None:
         await link.publish("/a", b"1")
 
 
-async def test_a_broker_that_goes_and_comes_back_is_found_and_heard_again() -> None:
-    (port,) = free_ports(1)
-    heard = Heard(port, "/a")
-    async with running(heard.link):
-        async with mqtt_broker("127.0.0.1", port):
-            await until(lambda: heard.link.connected)
-        await until(lambda: not heard.link.connected)
-        async with mqtt_broker("127.0.0.1", port):
-            await until(lambda: heard.link.connected)
-            await heard.link.publish("/a", b"again")
-            await until(lambda: heard.messages)
-
-
 @pytest.mark.parametrize("qos", [0, 1])
 async def test_a_mistake_of_who_listens_ends_the_link_and_not_its_connection_alone(
     qos: int,

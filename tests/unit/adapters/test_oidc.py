@@ -123,24 +123,15 @@ async def test_a_token_with_one_wrong_claim_proves_nothing(
     assert refused.value.failure == "untrusted"
 
 
-@pytest.mark.parametrize(("late_s", "fits"), [(320.0, True), (340.0, False)])
 async def test_clocks_may_differ_by_half_a_minute(
-    openid: OpenIdProvider,
-    provider: FakeIdentityProvider,
-    late_s: float,
-    *,
-    fits: bool,
+    openid: OpenIdProvider, provider: FakeIdentityProvider
 ) -> None:
     # Its tokens are good for 300 s.
-    provider.wall = lambda: time.time() - late_s
-
-    proves = True
-    try:
+    provider.wall = lambda: time.time() - 320.0
+    await vouched(openid, provider)
+    provider.wall = lambda: time.time() - 340.0
+    with pytest.raises(SignOnError):
         await vouched(openid, provider)
-    except SignOnError:
-        proves = False
-
-    assert proves is fits
 
 
 async def test_a_new_key_counts_at_once_and_one_that_is_gone_no_more(
@@ -185,14 +176,13 @@ async def test_a_bad_provider_is_refused_in_bounded_time_and_memory(
     provider.vice = vice
     begun = time.monotonic()
 
-    refused = False
-    try:
-        proof = await vouched(openid, provider)
-    except (HopError, SignOnError):
-        refused = True
-
     # A redirect is not followed: nothing of the user, but the token counts.
-    assert refused or (vice == "loop /userinfo" and proof.subject == "ana-1")
+    if vice == "loop /userinfo":
+        assert (await vouched(openid, provider)).subject == "ana-1"
+    else:
+        with pytest.raises((HopError, SignOnError)):
+            await vouched(openid, provider)
+
     assert len(provider.asked) <= 5
     assert time.monotonic() - begun < 5.0
 

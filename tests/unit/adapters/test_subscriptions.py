@@ -109,17 +109,6 @@ async def test_a_damaged_subscription_is_made_right(damage: dict[str, Any]) -> N
     assert (await ensure_subscriptions(store, URL, TOKEN, WANTED)).mended == ()
 
 
-@pytest.mark.parametrize(("url", "token"), [(URL + "2", TOKEN), (URL, "cd" * 16)])
-async def test_a_new_address_or_secret_reaches_every_subscription(
-    url: str, token: str
-) -> None:
-    store = FakeStore()
-    first = await ensure_subscriptions(store, URL, TOKEN, WANTED)
-    second = await ensure_subscriptions(store, url, token, WANTED)
-    assert second.ids == first.ids
-    assert len(second.mended) == len(WANTED)
-
-
 async def test_doubles_and_leftovers_of_ours_go_and_others_stay() -> None:
     store = FakeStore()
     await ensure_subscriptions(store, URL, TOKEN, WANTED)
