@@ -13,7 +13,6 @@ from iveg.cli.running import reachable_host
 from iveg.domain.accounts import digest_of
 from iveg.domain.records import AuditRecord
 from iveg.web.api import account
-from tests.unit.web.desk import LINK
 from tests.unit.web.security.test_people import ANA, CHIEF, OWN, PeoplesDesk, enter
 
 CHANGE = {"old": "acelga-1234", "new": "berenjena-77"}
@@ -333,30 +332,6 @@ async def test_who_is_revoked_is_out_before_the_answer(desk: AccessDesk) -> None
     assert desk.authenticator.current(who) is None
     assert desk.book.changes == [("token_revoked", "mes-stop", "ana")]
     assert await desk.programs() == ["mes-operate", "mes-read"]
-
-
-# --- another device signs in by a code that an operator shows it ---------------------
-
-
-@pytest.mark.parametrize(
-    ("base", "is_local"),
-    [
-        ("http://192.168.1.20:8123", False),
-        ("http://127.0.0.1:8000", True),
-        ("http://[::1]:8000", True),
-        ("http://localhost:8000", True),
-    ],
-)
-async def test_the_link_has_the_address_that_the_browser_reached_and_says_if_local(
-    desk: AccessDesk, base: str, *, is_local: bool
-) -> None:
-    desk.app.include_router(account.sign_in_code_router(LINK))
-    async with desk.browser() as browser:
-        told = (await browser.get(f"{base}/api/v1/sign-in-code")).json()
-
-    assert told["link"] == f"{base}/signin#token={LINK}"
-    assert told["image"].startswith("data:image/svg+xml")
-    assert told["local"] is is_local
 
 
 @pytest.mark.parametrize("every", ["0.0.0.0", "::"])  # noqa: S104 - nobody listens
