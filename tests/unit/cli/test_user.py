@@ -133,20 +133,6 @@ def test_reset_role_and_disable_end_sessions(
     ]
 
 
-def test_the_list_tells_names_roles_and_states_and_no_secret(
-    console: Console, capsys: pytest.CaptureFixture[str]
-) -> None:
-    console.call("add", "Eva", role="viewer", days=3)
-    console.call("add", "Ana")
-    capsys.readouterr()
-
-    console.call("list")
-
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "Ana  operator  invited"
-    assert lines[1].startswith("Eva  viewer  invited, ends 20")
-
-
 @pytest.mark.parametrize("name", ["<b>", "Console", "PROGRAM", "iveg", "operator"])
 def test_nobody_is_called_as_nobody_can_be_or_as_the_record_calls_others(
     console: Console, name: str
@@ -159,9 +145,11 @@ def test_nobody_is_called_as_nobody_can_be_or_as_the_record_calls_others(
     assert console.left == []
 
 
-def test_a_programs_token_is_printed_once_listed_and_revoked(
+def test_the_list_tells_people_and_programs_and_no_secret_and_a_token_is_revoked(
     console: Console, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    console.call("add", "Eva", role="viewer", days=3)
+    capsys.readouterr()
     console.call("token", "MES", scope="stop", days=2)
     token = capsys.readouterr().out.strip()
     (kept,) = console.book.tokens.values()
@@ -170,12 +158,13 @@ def test_a_programs_token_is_printed_once_listed_and_revoked(
     console.call("revoke", "mes")
 
     assert (kept.name, kept.scope, kept.digest) == ("MES", "stop", digest_of(token))
-    used, ends = listed.splitlines()[-1].split(", ends ")
-    assert used == "MES  program  stop  never used"
     assert kept.ends_at == kept.made_at + 2 * 86_400.0
-    assert ends == format_stamp(kept.ends_at)
+    person, program = listed.splitlines()
+    assert person.startswith("Eva  viewer  invited, ends 20")
+    ends = format_stamp(kept.ends_at)
+    assert program == f"MES  program  stop  never used, ends {ends}"
     assert token not in listed
     assert console.book.tokens == {}
     with pytest.raises(UnknownNameError):
         console.call("revoke", "MES")
-    assert console.left == ["token_added", "token_revoked"]
+    assert console.left == ["account_added", "token_added", "token_revoked"]
