@@ -61,13 +61,7 @@ def test_a_box_that_names_no_frame_is_read_without_one(
 
 
 @pytest.mark.parametrize(
-    "proof",
-    [
-        {"mono": -1.0},
-        {"heard": {"boot": "b"}},
-        {"heard": {"boot": "b", "seq": -1}},
-        {"heard": {"boot": None, "seq": 1}},
-    ],
+    "proof", [{"mono": -1.0}, {"heard": {"boot": "b"}}, {"heard": {"seq": 1}}]
 )
 def test_a_proof_of_age_that_is_none_is_refused(proof: dict[str, object]) -> None:
     payload = orjson.dumps({"base_pose_ground_truth": {**pose_value(), **proof}})

@@ -107,9 +107,7 @@ async def test_a_stop_that_does_not_come_true_is_a_grave_alert(
 
 
 async def test_a_held_robot_that_moves_is_a_grave_alert_until_it_stands_again() -> None:
-    desk = Desk()
-    await press(desk)
-    await desk.stand()
+    desk, _held = await standing()
     for _ in range(3):
         desk.drive("AGI", linear=0.4)
     await desk.wait(0.1)

@@ -1,6 +1,5 @@
 """The table of kinds is whole, and is what the pipeline does."""
 
-
 import pytest
 
 from iveg.domain.kinds import KINDS, Kind
