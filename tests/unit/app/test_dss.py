@@ -19,21 +19,6 @@ async def test_mqtt_and_the_rule_loop_alone_share_the_fate_of_the_process(
     dss: Dss,
 ) -> None:
     assert set(dss.vital()) == {"mqtt", "rule-loop"}
-    assert set(dss.comfort()) == {
-        "accounts",
-        "costmap",
-        "coverage",
-        "provisioner",
-        "equipment",
-        "history",
-        "retention",
-        "messages",
-        "peer-scans",
-        "earlier",
-        "loop-watch",
-        "pictures",
-        "recordings",
-    }
 
 
 async def test_no_chart_waits_for_an_incident_pack(dss: Dss) -> None:

@@ -15,10 +15,6 @@ dss = open_dss(Settings(), pathlib.Path(sys.argv[1]))
 paths = [str(route.path) for route in iter_route_contexts(create_app(dss).routes)]
 print("/latency" in paths)
 """
-COMMAND = """
-from iveg.cli import main
-main(sys.argv[1:])
-"""
 
 
 def run(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -32,14 +28,12 @@ def run(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_the_server_is_put_together_without_the_laboratory(tmp_path: Path) -> None:
-    ended = run(SERVER, str(tmp_path))
+def test_without_it_the_server_is_put_together_and_its_commands_are_unknown(
+    tmp_path: Path,
+) -> None:
+    server = run(SERVER, str(tmp_path))
+    command = run("from iveg.cli import main; main(['emulator'])")
 
-    assert (ended.stdout.split(), ended.stderr) == (["True"], "")
-
-
-def test_the_commands_of_the_laboratory_are_unknown() -> None:
-    ended = run(COMMAND, "emulator")
-
-    assert ended.returncode == 2
-    assert "invalid choice: 'emulator'" in ended.stderr
+    assert (server.stdout.split(), server.stderr) == (["True"], "")
+    assert command.returncode == 2
+    assert "invalid choice: 'emulator'" in command.stderr

@@ -52,17 +52,6 @@ def test_words_count_before_the_file_and_the_file_before_the_environment(
     assert (topics["odometry"], topics["cmd_vel_in"]) == ("/b/odom", "/go")
 
 
-def test_a_class_list_of_an_earlier_file_is_named_and_not_read(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    file = tmp_path / "robot.toml"
-    file.write_text('[detector]\nclasses = "yolox.txt"\n')
-
-    load_config(options("--config", str(file)), {})
-
-    assert "detector.classes is not read" in caplog.text
-
-
 def test_nobody_lets_a_robot_go_over_a_broker_that_is_not_here(
     tmp_path: Path,
 ) -> None:

@@ -131,20 +131,6 @@ def test_reset_and_disable_end_sessions(
     ]
 
 
-def test_the_list_tells_names_roles_and_states_and_no_secret(
-    console: Console, capsys: pytest.CaptureFixture[str]
-) -> None:
-    console.call("add", "Eva", role="viewer", days=3)
-    console.call("add", "Ana")
-    capsys.readouterr()
-
-    console.call("list")
-
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "Ana  operator  invited"
-    assert lines[1].startswith("Eva  viewer  invited, ends 20")
-
-
 @pytest.mark.parametrize("name", ["<b>", "Console", "PROGRAM", "iveg", "operator"])
 def test_nobody_is_called_as_nobody_can_be_or_as_the_record_calls_others(
     console: Console, name: str

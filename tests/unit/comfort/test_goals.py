@@ -111,15 +111,16 @@ async def test_goals_of_an_earlier_run_are_closed_and_ours_are_not() -> None:
     assert rows[ours.command_id].state == "SENT"
 
 
-@pytest.mark.parametrize("answer", [None, "ACCEPTED"])
-async def test_a_stop_deletes_the_goal_at_once(answer: str | None) -> None:
+async def test_a_stop_deletes_the_goal_and_the_robots_word_is_kept_beside_it() -> None:
     desk = await sent()
-    if answer is not None:
-        say(desk, answer)
+    say(desk, "ACCEPTED")
+
     await desk.commander.stop(["AGI"], "ben", desk.clock())
 
-    assert newest(desk).state == "DELETED"
+    assert (newest(desk).state, newest(desk).forgotten) == ("DELETED", None)
     assert "log.goal.held" in desk.sentences()
+    say(desk, "DROPPED", "held")
+    assert (newest(desk).state, newest(desk).forgotten) == ("DELETED", desk.clock())
 
 
 async def test_a_stop_before_the_goal_left_keeps_it_back() -> None:
@@ -130,16 +131,6 @@ async def test_a_stop_before_the_goal_left_keeps_it_back() -> None:
     await settle()
 
     assert desk.fleet.goals == []
-
-
-async def test_the_robots_word_that_it_forgot_is_kept_beside_a_deletion() -> None:
-    desk = await sent()
-    await desk.commander.stop(["AGI"], "ben", desk.clock())
-    assert newest(desk).forgotten is None
-
-    say(desk, "DROPPED", "held")
-
-    assert (newest(desk).state, newest(desk).forgotten) == ("DELETED", desk.clock())
 
 
 async def test_a_cancellation_names_the_goal_and_waits_for_the_robot() -> None:

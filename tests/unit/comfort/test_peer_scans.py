@@ -6,7 +6,7 @@ from dataclasses import replace
 from iveg.comfort.maps import PeerScans
 from iveg.domain.geometry import Pose2D
 from iveg.domain.peer_scan import PeerScan
-from tests.builders import at, safety_report, scan
+from tests.builders import at, ignore, safety_report, scan
 from tests.unit.domain.scene import Scene
 
 
@@ -16,12 +16,7 @@ class Field(Scene):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.told: list[PeerScan] = []
-        self.refused: list[tuple[str, str, str]] = []
-        self.part = PeerScans(self.world, self.refuse, self.told.append, "b")
-
-    def refuse(self, *refused: str) -> None:
-        robot_id, reason, detail = refused
-        self.refused.append((robot_id, reason, detail))
+        self.part = PeerScans(self.world, ignore, self.told.append, "b")
 
     def laser(self, robot_id: str, *, placed: bool = True) -> None:
         robot = self.world.robot(robot_id)

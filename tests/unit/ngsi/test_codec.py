@@ -164,23 +164,12 @@ def test_feedback_is_written_as_the_contract_says() -> None:
 
     written = orjson.loads(codec.write_feedback(feedback))
 
-    limited = {
-        "speed_factor": 0.5,
-        "reason": "person",
-        "distance_m": 1.43,
-        "decision_id": "d-1",
-    }
-
-    told = {
-        "decision_id": "d-1",
-        "class": "person",
-        "class_id": "farmer",
-        "conf": 0.94,
-        "position": {"x": 1.0, "y": 2.0, "z": 0.9},
-        "radius_m": 2.0,
-        "stamp": "t",
-        "observer": "AGI",
-    }
+    limited = {"speed_factor": 0.5, "reason": "person", "distance_m": 1.43}
+    who = {"class": "person", "class_id": "farmer", "conf": 0.94, "observer": "AGI"}
+    where = {"position": {"x": 1.0, "y": 2.0, "z": 0.9}, "radius_m": 2.0}
+    pose = {"x": 1.0, "y": 2.0, "yaw": 0.1}
+    twist = {"linear_velocity": 0.5, "angular_velocity": 0.0}
+    told = {"decision_id": "d-1", "stamp": "t"} | who | where
     assert written == {
         "boot": "b",
         "seq": 412,
@@ -188,15 +177,8 @@ def test_feedback_is_written_as_the_contract_says() -> None:
         "robot_id": "AGI",
         "alert": told,
         "alerts": [told],
-        "robot_pose": {
-            "x": 1.0,
-            "y": 2.0,
-            "yaw": 0.1,
-            "linear_velocity": 0.5,
-            "angular_velocity": 0.0,
-            "stamp": "t",
-        },
-        "speed_limits": {"AGII": limited},
+        "robot_pose": {**pose, **twist, "stamp": "t"},
+        "speed_limits": {"AGII": limited | {"decision_id": "d-1"}},
         "clear": ["AGI"],
         "seen": {"AGII": 8731},
     }

@@ -118,7 +118,6 @@ class Desk:
         linear: float = 0.0,
         released: tuple[str, ...] = (),
         decision_id: str | None = None,
-        challenge: str = "0123456789abcdef",
     ) -> None:
         report = safety_report(
             robot_id,
@@ -128,7 +127,6 @@ class Desk:
             linear=linear,
             released=released,
             decision_id=decision_id,
-            challenge=challenge,
             origin=self.next_origin(),
         )
         self.hear(report)

@@ -7,7 +7,6 @@ import pytest
 
 from iveg.domain.observations import Observation, Received
 from tests.builders import detection, detection_frame, odometry, origin, safety_report
-from tests.fakes.clock import FakeClock
 from tests.unit.vital.desk import Desk
 
 TICK_S = 1 / 30
@@ -47,7 +46,6 @@ def spoilt(
 
 def play(told: list[tuple[float, Observation]]) -> Desk:
     desk = Desk()
-    assert isinstance(desk.clock, FakeClock)
     for now, observation in told:
         desk.clock.now = now
         desk.loop.step([Received(observation, desk.clock())], desk.clock())
@@ -81,13 +79,11 @@ def test_f9_the_state_is_right_at_the_end_and_no_event_is_told_twice(
         assert found.odometry == robot.odometry
         assert found.frame == robot.frame
         assert found.safety == robot.safety
-    assert {
-        robot_id: (speed_limit.speed_factor, speed_limit.reason)
-        for robot_id, speed_limit in bad.evaluator.speed_limits.items()
-    } == {
-        robot_id: (speed_limit.speed_factor, speed_limit.reason)
-        for robot_id, speed_limit in clean.evaluator.speed_limits.items()
-    }
+    limits = [
+        [(one.speed_factor, one.reason) for one in desk.evaluator.speed_limits.values()]
+        for desk in (bad, clean)
+    ]
+    assert limits[0] == limits[1]
     assert len(bad.evaluator.people.known) == len(clean.evaluator.people.known) == 1
     # Nothing more than on a good network; of the start's speeds some pass unheard.
     missed = events(clean) - events(bad)

@@ -29,13 +29,20 @@ def send(desk: Desk, seen: Detection) -> None:
     desk.hear(frame)
 
 
-async def test_a_box_of_six_zeros_is_nobody_at_the_origin_and_a_frame_not_whole() -> (
-    None
-):
+@pytest.mark.parametrize(
+    "seen",
+    [
+        replace(detection(), box=Box3D(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)),
+        sides(4.0, 500.0, 0.5, 1.8),
+    ],
+    ids=["six zeros", "as long as a hall"],
+)
+async def test_a_box_without_a_place_is_nobody_and_its_frame_is_not_whole(
+    seen: Detection,
+) -> None:
     desk = parked()
-    nowhere = replace(detection(), box=Box3D(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
-    send(desk, nowhere)
+    send(desk, seen)
     await desk.wait(0.1)
 
     assert factors(desk) == [0.5, 0.5]
@@ -62,15 +69,6 @@ def test_a_box_that_no_person_has_protects_and_its_frame_is_not_whole(
 
     assert factors(desk) == [0.5, 0.5]
     assert len(desk.evaluator.people.known) == 1
-
-
-def test_a_box_as_long_as_a_hall_has_no_place() -> None:
-    desk = parked()
-
-    send(desk, sides(4.0, 500.0, 0.5, 1.8))
-
-    assert factors(desk) == [0.5, 0.5]
-    assert desk.evaluator.people.known == {}
 
 
 def test_a_ring_is_as_much_wider_as_its_box_is_longer_than_a_person() -> None:

@@ -59,17 +59,6 @@ def test_a_person_in_an_unknown_frame_slows_who_is_near_for_a_second() -> None:
     assert factors(desk) == [1.0, 1.0]
 
 
-async def test_a_box_before_the_first_pose_slows_and_is_no_alert_yet() -> None:
-    desk = Desk(("AGI", "AGII"))
-    desk.drive("AGII", 10.0, linear=0.0)
-    desk.look("AGII")
-    desk.look("AGI", replace(detection(x=4.0), frame_id="base_link"))
-    await desk.wait(0.1)
-
-    assert factors(desk) == [0.5, 0.5]
-    assert "alert.unreadable_detection" not in conditions_of(desk)
-
-
 def test_a_robot_that_invents_frames_fills_neither_the_log_nor_the_room_of_others() -> (
     None
 ):

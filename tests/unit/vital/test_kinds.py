@@ -1,7 +1,5 @@
 """The table of kinds is whole, and is what the pipeline does."""
 
-from dataclasses import dataclass
-
 import pytest
 
 from iveg.domain.kinds import KINDS, Kind
@@ -17,13 +15,11 @@ from iveg.domain.observations import (
     Received,
 )
 from iveg.domain.world import World
-from iveg.models.robot import Device
 from tests.builders import (
     at,
     detection_frame,
     odometry,
     origin,
-    received,
     safety_report,
     scan,
 )
@@ -86,19 +82,3 @@ async def test_a_battery_at_a_fifth_is_a_p3_until_it_is_at_a_quarter() -> None:
         told.append(LOW in conditions_of(desk))
 
     assert told == [False, False, True, True, True, False, False]
-
-
-@dataclass(frozen=True, slots=True)
-class SoilMoisture(Observation):
-    """A sensor with a name of two words."""
-
-    percentage: float
-
-
-def test_a_sensor_with_a_name_of_two_words_has_an_age() -> None:
-    world = World(["AGI"])
-    world.apply(received(SoilMoisture("AGI", origin(1), 40.0), after=1.0))
-
-    device = Device.of(world.robot("AGI"), "_soil_moisture", SoilMoisture, at(3.0))
-
-    assert (device.kind, device.age_s) == ("soil_moisture", 2.0)

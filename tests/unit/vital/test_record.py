@@ -23,14 +23,10 @@ KEPT = (
 )
 
 
-def waiting(record: Record, since: float = 0.0) -> Waiting:
-    return Waiting(record, 1, since)
-
-
 def queue_of(capacity: int, *records: Record) -> RecordQueue:
     queue = RecordQueue(capacity)
     for since, record in enumerate(records):
-        queue.enqueue(waiting(record, float(since)))
+        queue.enqueue(Waiting(record, 1, float(since)))
     return queue
 
 
@@ -48,15 +44,11 @@ def test_only_telemetry_may_be_dropped() -> None:
 
 
 def test_a_full_queue_drops_its_oldest_telemetry_and_counts_it() -> None:
-    queue = queue_of(2, odometry_record(x=1.0), odometry_record(x=2.0))
-
-    queue.enqueue(waiting(odometry_record(x=3.0)))
+    queue = queue_of(2, *(odometry_record(x=x) for x in (1.0, 2.0, 3.0)))
 
     assert queue.dropped == 1
-    assert records(queue.dequeue(10)) == [
-        odometry_record(x=2.0),
-        odometry_record(x=3.0),
-    ]
+    newest = [odometry_record(x=2.0), odometry_record(x=3.0)]
+    assert records(queue.dequeue(10)) == newest
 
 
 def test_telemetry_makes_room_for_what_may_not_be_lost() -> None:
@@ -74,11 +66,9 @@ def test_orders_stay_even_when_there_is_no_room() -> None:
 
 
 def test_what_is_put_back_stands_where_it_stood() -> None:
-    queue = queue_of(
-        10, odometry_record(x=1.0), odometry_record(x=2.0), odometry_record(x=3.0)
-    )
+    told = [odometry_record(x=x) for x in (1.0, 2.0, 3.0)]
+    queue = queue_of(10, *told)
 
     queue.put_back(queue.dequeue(2))
 
-    xs = [getattr(record, "x", None) for record in records(queue.dequeue(10))]
-    assert xs == [1.0, 2.0, 3.0]
+    assert records(queue.dequeue(10)) == told

@@ -6,6 +6,7 @@ from iveg.domain.observations import Observation, Received
 from iveg.vital.feedback import MOST_ALERTS
 from tests.builders import START, detection, detection_frame, odometry
 from tests.unit.vital.desk import Desk, conditions_of
+from tests.unit.vital.test_frames import factors
 
 ALERT = "alert.pictures_not_judged"
 
@@ -17,34 +18,22 @@ def driving(desk: Desk) -> Desk:
     return desk
 
 
-def stormed() -> Desk:
-    """AGI sends a hundred pictures within a tenth of a second."""
-    desk = driving(Desk())
-    for _ in range(100):
-        desk.clock.now += 0.001
-        desk.look("AGI")
-    return desk
-
-
-def arrive(desk: Desk, *observations: Observation) -> None:
-    now = desk.clock()
-    desk.loop.step([Received(one, now) for one in observations], now)
-
-
 def test_what_arrives_together_is_judged_and_told_once() -> None:
     desk = driving(Desk())
     desk.clock.now = 0.01
     before = len(desk.fleet.told)
     somebody = detection(x=0.5, y=0.0)
-    arrive(
-        desk,
+    looks: list[Observation] = [
         odometry("AGI", 0.1, origin=desk.next_origin()),
         odometry("AGII", 1.0, origin=desk.next_origin()),
         detection_frame("AGI", somebody, origin=desk.next_origin()),
         detection_frame("AGII", somebody, origin=desk.next_origin()),
-    )
+    ]
+
+    desk.loop.step([Received(one, desk.clock()) for one in looks], desk.clock())
+
     assert len(desk.fleet.told) - before == len(desk.world.robots)
-    assert {one.speed_factor for one in desk.evaluator.speed_limits.values()} == {0.5}
+    assert factors(desk) == [0.5, 0.5]
 
 
 def test_who_must_slow_down_is_told_at_once_and_the_rest_ten_times_a_second() -> None:
@@ -61,28 +50,22 @@ def test_who_must_slow_down_is_told_at_once_and_the_rest_ten_times_a_second() ->
     assert sum(told) <= 13
 
 
-async def test_a_storm_slows_who_is_near_and_raises_one_alert() -> None:
-    desk = stormed()
+async def test_a_storm_slows_who_is_near_and_is_an_alert_until_it_is_over() -> None:
+    desk = driving(Desk())
+    for _ in range(100):
+        desk.clock.now += 0.001
+        desk.look("AGI")
+
     await desk.wait(0.05)
-    assert [one.speed_factor for one in desk.evaluator.speed_limits.values()] == [
-        0.5,
-        0.5,
-    ]
+
+    assert factors(desk) == [0.5, 0.5]
     assert desk.evaluator.speed_limits["AGII"].cause == "AGI"
     assert list(conditions_of(desk)).count(ALERT) == 1
-
-
-async def test_it_is_over_a_second_after_the_last_that_was_not_judged() -> None:
-    desk = stormed()
-    await desk.wait(1.05)
-    for robot_id, x in (("AGI", 0.0), ("AGII", 10.0)):
-        desk.drive(robot_id, x)
-        desk.look(robot_id)
+    # It is over a second after the last picture that was not judged.
+    await desk.wait(1.0)
+    driving(desk)
     await desk.wait(0.05)
-    assert [one.speed_factor for one in desk.evaluator.speed_limits.values()] == [
-        1.0,
-        1.0,
-    ]
+    assert factors(desk) == [1.0, 1.0]
     assert ALERT in conditions_of(desk)
     await desk.wait(9.5)
     assert ALERT not in conditions_of(desk)

@@ -118,8 +118,6 @@ def test_f62_the_last_feedback_limits_every_robot_to_half_speed() -> None:
     desk.evaluator.leave_unsupervised(desk.clock())
 
     limits = desk.fleet.told[-1].speed_limits
-    assert {name: one.speed_factor for name, one in limits.items()} == {
-        "AGI": 0.5,
-        "AGII": 0.5,
-    }
+    assert set(limits) == {"AGI", "AGII"}
+    assert {one.speed_factor for one in limits.values()} == {0.5}
     assert {one.reason for one in limits.values()} == {"unsupervised"}

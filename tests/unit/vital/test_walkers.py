@@ -41,20 +41,13 @@ def test_who_walks_by_one_robots_laser_slows_the_other_for_three_seconds() -> No
     assert factors[-1] == FULL_SPEED, "3 s, and 1 s until the limit is lifted"
 
 
-def test_what_has_not_moved_makes_no_zone() -> None:
+def test_what_has_not_moved_or_orion_kept_is_nobody() -> None:
     desk = Desk(("AGI", "AGII"))
     beside(desk)
+    kept = replace(safety_report(), obstacle=ReportedObstacle(6.5, 0.0, 0.5, True))
+    desk.hear(replace(kept, origin=desk.next_origin()), asked=True)
 
     assert beside(desk, (6.5, 0.0), moved=False)["AGII"] == FULL_SPEED
-    assert desk.evaluator.people.known == {}
-
-
-def test_what_orion_kept_of_a_walker_makes_nobody_appear() -> None:
-    desk = Desk(("AGI", "AGII"))
-    beside(desk)
-    told = replace(safety_report(), obstacle=ReportedObstacle(6.5, 0.0, 0.5, True))
-    desk.hear(replace(told, origin=desk.next_origin()), asked=True)
-
     assert desk.evaluator.people.known == {}
 
 
