@@ -132,7 +132,7 @@ class Session:
     Attributes:
         digest: SHA-256 of the token (hex).
         role: What they were when they came.
-        began: Unix time of the sign-in (s); ``seen`` of the last sign of life.
+        began: Unix time of the sign-in (s).
         person: Id of the account; empty in sessions of earlier versions.
         method: How they signed in.
         until: When it is over at the latest (Unix s); None: no earlier than others.
@@ -142,7 +142,6 @@ class Session:
     name: str
     role: PersonRole
     began: float
-    seen: float
     person: str = ""
     method: SignInMethod = "link"
     until: float | None = None
@@ -251,10 +250,10 @@ class AccessBook:
         self.keep()
 
     def open(self, session: Session) -> None:
-        """Let a session begin; of too many the one that was idle longest ends."""
+        """Let a session begin; of too many the oldest ends."""
         known = self.sessions
         if len(known) >= MOST_SESSIONS:
-            del known[min(known, key=lambda digest: known[digest].seen)]
+            del known[min(known, key=lambda digest: known[digest].began)]
         self.sessions[session.key] = session
         self.keep()
 

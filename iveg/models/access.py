@@ -63,7 +63,6 @@ class OpenSession(Model):
     role: str = Field(description="That is left now; `expired`: STOP alone.")
     kind: SessionKind
     began_at: Stamp
-    seen_at: Stamp = Field(description="The last request.")
     own: bool = Field(description="The one that asks.")
 
 

@@ -594,8 +594,6 @@ export type OpenSession = {
   role: string;
   kind: "link" | "account";
   began_at: string;
-  /** The last request. */
-  seen_at: string;
   /** The one that asks. */
   own: boolean;
 };

@@ -10,7 +10,6 @@ An attempt waits in a sealed cookie of the browser that began it; the server kee
 
 import asyncio
 import contextlib
-import logging
 import re
 from collections.abc import AsyncIterator
 from typing import Final
@@ -34,7 +33,6 @@ from iveg.web.security.secrets import same_secret
 CALLBACK: Final = "/signin/sso/callback"
 _MOST_TOGETHER = 8
 _OWN_PATH: Final = re.compile(r"/(?![/\\])[!-\[\]-~]{0,500}")
-_log = logging.getLogger(__name__)
 
 
 class SingleSignOn:
@@ -143,8 +141,7 @@ class SingleSignOn:
 
     def _note_refused(self, request: Request, error: SignOnError) -> None:
         facts = {"by": "sso", "why": error.failure, "detail": error.detail}
-        if self._authenticator.attempts.note_refused(request, **facts):
-            _log.warning("sign-in by the provider refused: %s", error)
+        self._authenticator.attempts.note_refused(request, **facts)
 
 
 def _code(request: Request) -> str:

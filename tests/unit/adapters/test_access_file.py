@@ -13,7 +13,7 @@ from iveg.domain.audit import CONSOLE
 
 ANA = Account("P1", "Ana", "operator", password="#hash", since=12.5)
 MES = ApiToken("T1", "MES", "stop", "ab" * 32, 1.0)
-KEPT = Access((ANA,), (MES,), (Session("cd" * 32, "Ana", "operator", 1.0, 2.0, "P1"),))
+KEPT = Access((ANA,), (MES,), (Session("cd" * 32, "Ana", "operator", 1.0, "P1"),))
 
 
 @pytest.fixture

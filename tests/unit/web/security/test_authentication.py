@@ -108,20 +108,15 @@ async def test_the_cookie_is_bound_to_this_site_and_hidden_from_scripts(
     assert (await client.get(f"{scheme}://iveg.test/read")).json()["role"] == "operator"
 
 
-async def test_a_wrong_token_is_told_once_a_minute_and_never_quoted(
+async def test_wrong_tokens_are_told_a_few_times_and_never_quoted(
     client: Client,
-    authenticator: Authenticator,
-    clock: Clock,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    for _ in range(5):
+    for _ in range(50):
         await enter(client, "guess-after-guess")
-    clock.now += 61.0
-    await enter(client, "guess-after-guess")
 
     records = [r for r in caplog.records if r.levelno == logging.WARNING]
-    assert authenticator.attempts.refused == 6
-    assert len(records) == 2
+    assert len(records) == 5
     assert "guess" not in caplog.text
 
 
@@ -191,21 +186,6 @@ def test_use_keeps_a_session_alive_but_not_beyond_a_day(clock: Clock) -> None:
         roles.append(found.role)
 
     assert roles == ["operator"] * 4 + ["expired"] * 2
-
-
-def test_watching_alone_does_not_keep_a_session_alive(clock: Clock) -> None:
-    sessions = Sessions(clock, AccessBook())
-    principal = sessions.find(sessions.open("Ana", "operator"))
-    assert principal is not None
-
-    clock.now += 11 * HOUR
-    before = sessions.current(principal)
-    clock.now += 2 * HOUR
-    after = sessions.current(principal)
-
-    assert before == principal
-    assert after is not None
-    assert after.role == "expired"
 
 
 def test_sessions_are_bounded_and_the_longest_idle_gives_way(

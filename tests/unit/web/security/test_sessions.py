@@ -94,21 +94,6 @@ def test_a_viewer_stays_for_thirty_days_unused_and_may_then_stop(
     assert [one and one.role for one in found] == ["viewer", "expired", None]
 
 
-def test_a_sign_of_life_is_kept_within_a_minute(
-    start: Restart, clock: FakeClock
-) -> None:
-    sessions = start()
-    token = sessions.open("Ana", "operator")
-    clock.now += 11 * HOUR
-    sessions.find(token)
-    clock.now += 2 * HOUR
-
-    found = start().find(token)
-
-    assert found is not None
-    assert found.role == "operator"
-
-
 def test_a_clock_that_was_ahead_makes_no_session_that_never_ends(
     start: Restart, clock: FakeClock
 ) -> None:

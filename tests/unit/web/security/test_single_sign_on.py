@@ -296,6 +296,6 @@ async def test_neither_log_nor_audit_holds_a_token_a_code_or_a_secret(
     codes = [form["code"] for form in desk.provider.forms]
     verifiers = [form["code_verifier"] for form in desk.provider.forms]
     assert len(codes) == 2
-    assert "sign-in by the provider refused" in told
+    assert "sign-in refused" in told
     secret = [SECRET, "eyJ", *codes, *verifiers]
     assert [one for one in secret if one in told] == []
