@@ -28,7 +28,6 @@ from iveg.setting_types import (
     DirectRead,
     Gigabytes,
     Hex,
-    Hours,
     Line,
     Name,
     Port,
@@ -256,11 +255,6 @@ class Settings:
     )
     sso_label: Line = setting(
         "IVEG_SSO_LABEL", "", "What the button says; empty: Single sign-on."
-    )
-    sso_hours: Hours = setting(
-        "IVEG_SSO_HOURS",
-        12.0,
-        "How long a session lasts that began at the provider (h); STOP for longer.",
     )
     rule: Parameters = field(default_factory=Parameters)
     stop_direct: Switch = setting(

@@ -135,7 +135,6 @@ class Session:
         began: Unix time of the sign-in (s).
         person: Id of the account; empty in sessions of earlier versions.
         method: How they signed in.
-        until: When it is over at the latest (Unix s); None: no earlier than others.
     """
 
     digest: str
@@ -144,7 +143,6 @@ class Session:
     began: float
     person: str = ""
     method: SignInMethod = "link"
-    until: float | None = None
 
     @property
     def key(self) -> bytes:

@@ -27,9 +27,6 @@ class SignInCode(Model):
 
     link: str
     image: str
-    local: bool = Field(
-        description="The address works on the server's own computer alone."
-    )
 
 
 class OwnAccount(Model):

@@ -41,7 +41,6 @@ BAD = [
     ("IVEG_SSO_ISSUER", "http://idm.test", "an https address, or one of this machine"),
     ("IVEG_SSO_ROLES", "growers=owner", "values of the claim and roles"),
     ("IVEG_SSO_ROLES", "a=admin,a=viewer", "values of the claim and roles"),
-    ("IVEG_SSO_HOURS", "25", "a number of hours from 0.25 to 24"),
     ("IVEG_ON_LINK_LOSS", "drive", "one of stop, slow"),
 ]
 SECRET = [
@@ -153,7 +152,6 @@ GOOD = {
     "IVEG_SSO_ROLES": "growers=operator,owners = admin",
     "IVEG_SSO_NAME_CLAIM": "preferred_username",
     "IVEG_SSO_LABEL": "Cooperativa",
-    "IVEG_SSO_HOURS": "8",
     "IVEG_CONFIDENCE_THRESHOLD": "0.75",
     "IVEG_SAFETY_RADIUS_M": "2.0,robot=3.0",
     "IVEG_FORESIGHT": "off",

@@ -852,8 +852,6 @@ export type Server = {
 export type SignInCode = {
   link: string;
   image: string;
-  /** The address works on the server's own computer alone. */
-  local: boolean;
 };
 
 /** The worst that holds for a robot now, and what a person can do. */

@@ -6,7 +6,6 @@ own: neither its token nor its digest leaves.
 """
 
 from functools import partial
-from ipaddress import ip_address
 from typing import Annotated
 
 import segno
@@ -147,17 +146,7 @@ def code_of(request: Request, proof: str) -> SignInCode:
     image = segno.make(link, micro=False).svg_data_uri(
         scale=_SCALE, border=4, dark="#000", light="#fff"
     )
-    return SignInCode(
-        link=link, image=image, local=_is_local(request.url.hostname or "")
-    )
-
-
-def _is_local(host: str) -> bool:
-    """Whether an address leads nowhere from another device."""
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost" or host.endswith(".localhost")
+    return SignInCode(link=link, image=image)
 
 
 class _Newcomer(Body):

@@ -29,8 +29,9 @@ VIEWER_S = 30 * 86400.0
 
 def role_at(session: Session, now: float) -> Role | None:
     """The role that is left at ``now`` (Unix s); None when all is over."""
-    ends = session.began + (VIEWER_S if session.role == "viewer" else LASTS_S)
-    over = now - (ends if session.until is None else min(ends, session.until))
+    # The provider gives a role anew at each sign-in.
+    is_long = session.role == "viewer" and session.method != "sso"
+    over = now - session.began - (VIEWER_S if is_long else LASTS_S)
     if over <= 0:
         return session.role
     return "expired" if over <= STOP_ONLY_S else None
@@ -61,7 +62,6 @@ class Sessions:
         role: Role,
         person: str = "",
         method: SignInMethod = "link",
-        until: float | None = None,
     ) -> str:
         """Begin a session; returns its token, which is stored nowhere.
 
@@ -70,13 +70,12 @@ class Sessions:
             role: What they are.
             person: Id of the account.
             method: How they signed in.
-            until: When it is over at the latest (Unix s).
         """
         token = secrets.token_urlsafe(32)
         now = self._clock().wall
         digest = _digest(token)
         theirs = cast("PersonRole", role)
-        began = Session(digest.hex(), name, theirs, now, person, method, until)
+        began = Session(digest.hex(), name, theirs, now, person, method)
         self._book.open(began)
         return token
 

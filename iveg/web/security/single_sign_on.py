@@ -2,7 +2,7 @@
 
 A browser goes to the provider and comes back with a code, which iVeg exchanges::
 
-    begin ──> provider's page ──> finish ──> session, at most IVEG_SSO_HOURS
+    begin ──> provider's page ──> finish ──> session, at most 12 h
                                      └─────> refused: why, on the page and in the audit
 
 An attempt waits in a sealed cookie of the browser that began it; the server keeps none.
@@ -42,7 +42,6 @@ class SingleSignOn:
         provider: Vouches for them.
         reading: Where name and role stand in what it says.
         authenticator: Keeps their accounts and sessions.
-        lasts_s: How long a session lasts (s).
     """
 
     def __init__(
@@ -50,10 +49,9 @@ class SingleSignOn:
         provider: IdentityProvider,
         reading: ClaimReading,
         authenticator: Authenticator,
-        lasts_s: float,
     ) -> None:
         self._provider, self._reading = provider, reading
-        self._authenticator, self._lasts_s = authenticator, lasts_s
+        self._authenticator = authenticator
         self._clock = authenticator.people.clock
         self._attempts = SealedAttempts()
         self._exchanges = asyncio.Semaphore(_MOST_TOGETHER)
@@ -123,9 +121,8 @@ class SingleSignOn:
         """Begin the session of a person who was vouched for; returns its token."""
         by = Actor(told.name, told.role, told.account_id, "sso")
         account = self._authenticator.people.admission(by).vouched(told)
-        until = self._clock().wall + self._lasts_s
         return self._authenticator.sessions.open(
-            account.name, account.role, account.account_id, "sso", until
+            account.name, account.role, account.account_id, "sso"
         )
 
     @contextlib.asynccontextmanager
