@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal, TypeVar
 
-from iveg.domain.audit import Actor
+from iveg.domain.audit import CONSOLE, Actor
 from iveg.domain.errors import NameTakenError, SignOnError
 from iveg.domain.records import Json
 
@@ -21,8 +21,8 @@ SignInMethod = Literal["link", "password", "sso", "token"]
 OF_ACCOUNTS: Final = frozenset({"password", "sso"})
 """Methods of people with an account, which decides over their sessions."""
 PersonRole = Literal["viewer", "operator", "admin"]
-AccountState = Literal["active", "invited", "lapsed", "over", "disabled"]
-"""``lapsed``: the invitation was not taken in time; ``over``: ended by itself."""
+AccountState = Literal["active", "invited", "over", "disabled"]
+"""``over``: ended by itself."""
 TokenScope = Literal["read", "stop", "operate"]
 """Rights of a program: read; also stop; also release, resume and all else of people."""
 
@@ -93,13 +93,9 @@ class Account:
 
     def state(self, now: float) -> AccountState:
         """State of the account at this moment (Unix s)."""
-        if self.disabled:
-            return "disabled"
         if not self.is_open(now):
-            return "over"
-        if self.password or self.provider:
-            return "active"
-        return "invited" if self.invitation and now < self.invited_until else "lapsed"
+            return "disabled" if self.disabled else "over"
+        return "active" if self.password or self.provider else "invited"
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,11 +172,11 @@ class AccessChange:
         gone: It is kept no longer.
     """
 
-    by: Actor
     action: str
     row: Account | ApiToken
     details: Json = field(default_factory=dict)
     gone: bool = False
+    by: Actor = CONSOLE
 
 
 class AccessBook:

@@ -69,8 +69,7 @@ class UserAccount(Model):
     Attributes:
         user_id: The id is never given anew.
         name: The id is never given anew.
-        state: ``lapsed``: the invitation was not taken in time; ``over``: it ended by
-            itself.
+        state: ``over``: it ended by itself.
     """
 
     user_id: str

@@ -990,7 +990,7 @@ export type UserAccount = {
   user_id: string;
   name: string;
   role: "viewer" | "operator" | "admin";
-  state: "active" | "invited" | "lapsed" | "over" | "disabled";
+  state: "active" | "invited" | "over" | "disabled";
   /** When it ends by itself; null: never. */
   ends_at: string | null;
   /** Null where no invitation waits. */
