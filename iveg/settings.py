@@ -222,11 +222,6 @@ class Settings:
         "Identity provider at which people may sign in, by its address (`issuer`) to "
         "the last slash; empty: none (docs/deployment.md).",
     )
-    sso_provider: Literal["oidc", "keyrock"] = setting(
-        "IVEG_SSO_PROVIDER",
-        "oidc",
-        "What it speaks: OpenID Connect (`oidc`), or FIWARE Keyrock's own (`keyrock`).",
-    )
     sso_client_id: Line = setting(
         "IVEG_SSO_CLIENT_ID", "", "Name of this iVeg at the provider."
     )

@@ -283,7 +283,7 @@ class ClaimReading:
 
     A path fits the shapes of the providers (docs/deployment.md, "Single sign-on"):
     ``realm_access.roles`` (Keycloak), ``roles`` or ``groups`` (Entra),
-    ``roles[].name`` (Keyrock).
+    ``roles[].name`` (lists of objects).
 
     Attributes:
         roles: Value of a claim → the role that it gives.

@@ -144,7 +144,6 @@ GOOD = {
     "IVEG_SIGN_IN": "accounts",
     "IVEG_SIGN_IN_NAME": "Ana Núñez",
     "IVEG_SSO_ISSUER": "https://idm.test/realms/coop/",
-    "IVEG_SSO_PROVIDER": "keyrock",
     "IVEG_SSO_CLIENT_ID": "iveg",
     "IVEG_SSO_CLIENT_SECRET": "of the client",
     "IVEG_SSO_SCOPES": "openid",
