@@ -107,9 +107,6 @@ Line = Annotated[
     StringConstraints(pattern=r"^[^\x00-\x1f\x7f]{1,256}$"),
     "1 to 256 characters on one line",
 ]
-Hours = Annotated[
-    float, Interval(ge=0.25, le=24.0), "a number of hours from 0.25 to 24"
-]
 Hex = Annotated[
     str,
     StringConstraints(pattern="^[0-9a-fA-F]{32,128}$"),

@@ -28,7 +28,6 @@ from iveg.setting_types import (
     DirectRead,
     Gigabytes,
     Hex,
-    Hours,
     Line,
     Name,
     Port,
@@ -223,11 +222,6 @@ class Settings:
         "Identity provider at which people may sign in, by its address (`issuer`) to "
         "the last slash; empty: none (docs/deployment.md).",
     )
-    sso_provider: Literal["oidc", "keyrock"] = setting(
-        "IVEG_SSO_PROVIDER",
-        "oidc",
-        "What it speaks: OpenID Connect (`oidc`), or FIWARE Keyrock's own (`keyrock`).",
-    )
     sso_client_id: Line = setting(
         "IVEG_SSO_CLIENT_ID", "", "Name of this iVeg at the provider."
     )
@@ -256,11 +250,6 @@ class Settings:
     )
     sso_label: Line = setting(
         "IVEG_SSO_LABEL", "", "What the button says; empty: Single sign-on."
-    )
-    sso_hours: Hours = setting(
-        "IVEG_SSO_HOURS",
-        12.0,
-        "How long a session lasts that began at the provider (h); STOP for longer.",
     )
     rule: Parameters = field(default_factory=Parameters)
     stop_direct: Switch = setting(

@@ -12,7 +12,7 @@ import asyncio
 import logging
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
@@ -30,23 +30,13 @@ from iveg.domain.records import Json
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
-class _LeftChange:
-    """A change as the console leaves it; ``AccessChange`` explains the names."""
-
-    action: str
-    row: Account | ApiToken
-    details: Json
-    gone: bool
-
-
 FORM: Final = Form("accounts")
 _READ: Final[dict[str, TypeAdapter[Any]]] = {
     "account": TypeAdapter(Account),
     "token": TypeAdapter(ApiToken),
     "session": TypeAdapter(Session),
     "end": TypeAdapter(tuple[int, bool]),
-    "change": TypeAdapter(_LeftChange),
+    "change": TypeAdapter(AccessChange),
 }
 _MOST_ASIDE: Final = 5
 _Seen = tuple[int, int, int]
@@ -184,8 +174,7 @@ class AccessFile:
         Raises:
             HopError: the disk did not take it.
         """
-        left = _LeftChange(change.action, change.row, change.details, change.gone)
-        line = orjson.dumps({"change": left})
+        line = orjson.dumps({"change": change})
         try:
             write_bytes(self.beside(f"{self._path.name}.left-{new_id()}"), line)
         except OSError as error:
@@ -198,12 +187,9 @@ class AccessFile:
             if path.suffix.endswith((".new", ".unreadable")):
                 continue
             try:
-                _, left = _row(path.read_bytes())
-                change = AccessChange(
-                    CONSOLE, left.action, left.row, left.details, left.gone
-                )
-                found.append((path, change))
-            except (OSError, ValueError, AttributeError) as error:
+                _, change = _row(path.read_bytes())
+                found.append((path, replace(change, by=CONSOLE)))
+            except (OSError, ValueError, TypeError) as error:
                 put_aside(path, type(error).__name__)
         return found
 

@@ -138,7 +138,7 @@ class Admission:
 
     def _change(self, account: Account, action: str, **details: object) -> Account:
         told = {"role": account.role, **details}
-        self._book.apply(AccessChange(self._by, action, account, told))
+        self._book.apply(AccessChange(action, account, told, by=self._by))
         return account
 
     def _invited(self, account: Account, waits_s: float) -> tuple[str, Account]:
@@ -163,12 +163,12 @@ class Admission:
             new_id(), name, scope, digest_of(token), self._now, ends_at=ends_at
         )
         details = {"scope": scope, "ends_at": ends_at}
-        self._book.apply(AccessChange(self._by, "token_added", made, details))
+        self._book.apply(AccessChange("token_added", made, details, by=self._by))
         return token, made
 
     def revoke(self, token: ApiToken) -> None:
         """Delete a token."""
-        change = AccessChange(self._by, "token_revoked", token, gone=True)
+        change = AccessChange("token_revoked", token, gone=True, by=self._by)
         self._book.apply(change)
 
 

@@ -1,16 +1,12 @@
-"""Identity providers: the code flow that all share, and FIWARE Keyrock.
+"""Sign-in at an identity provider, without the library that it takes.
 
-A provider that speaks OpenID Connect is ``adapters/oidc.py``.  Keyrock signs its ID
-tokens with a secret that it shares (HS256), which proves nothing to us; there the
-person is read from ``/user`` with the access token, straight from Keyrock.  Source:
-the pages "OAuth" and "OIDC" of Keyrock's documentation (repository ging/fiware-idm).
+``adapters/oidc.py`` is the one that speaks OpenID Connect (extra ``sso``).
 """
 
 import secrets
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import Final
-from urllib.parse import urlencode, urlsplit
 
 import orjson
 from cryptography.fernet import Fernet, InvalidToken
@@ -105,55 +101,6 @@ class IdentityProvider(ABC):
     async def close(self) -> None:
         """Close connections."""
         await self._http.close()
-
-    def _code_address(self, url: str, attempt: Attempt, **more: str) -> str:
-        """Where a code is given (RFC 6749, 4.1.1)."""
-        query = {
-            "response_type": "code",
-            "client_id": self.client.client_id,
-            "redirect_uri": attempt.back,
-            "state": attempt.state,
-            **more,
-        }
-        return f"{url}{'&' if urlsplit(url).query else '?'}{urlencode(query)}"
-
-    async def _redeem(self, url: str, attempt: Attempt, code: str) -> Json:
-        """Exchange a code at the token endpoint (RFC 6749, 4.1.3; RFC 7636, 4.5)."""
-        form = {
-            "grant_type": "authorization_code",
-            "code": code,
-            "redirect_uri": attempt.back,
-            "code_verifier": attempt.verifier,
-        }
-        login = None
-        if self.client.secret:
-            login = self.client.client_id, self.client.secret
-        else:
-            form["client_id"] = self.client.client_id
-        answer = await self._http.post(url, form, login)
-        if not answer.is_success:
-            raise SignOnError("untrusted", f"the code was refused: {answer.refusal}")
-        return answer.body
-
-
-class Keyrock(IdentityProvider):
-    """FIWARE Keyrock, by OAuth 2.0 and its own ``/user``."""
-
-    async def address(self, attempt: Attempt) -> str:
-        """Where a browser goes to sign in."""
-        return self._code_address(f"{self.client.issuer}/oauth2/authorize", attempt)
-
-    async def vouch(self, attempt: Attempt, code: str) -> Vouched:
-        """Exchange the code, and read whose it is."""
-        token = await self._redeem(f"{self.client.issuer}/oauth2/token", attempt, code)
-        query = {"access_token": text_of(token, "access_token")}
-        answer = await self._http.get(f"{self.client.issuer}/user", query)
-        if not answer.is_success:
-            raise SignOnError("untrusted", f"/user answered {answer.status}")
-        # A token of another application would prove somebody to that one alone.
-        if answer.body.get("app_id") != self.client.client_id:
-            raise SignOnError("untrusted", "the token is another application's")
-        return Vouched(text_of(answer.body, "id"), answer.body)
 
 
 def text_of(answer: Json, name: str) -> str:

@@ -6,6 +6,7 @@ Sources: OpenID Connect Core 1.0, 3.1; Discovery 1.0; RFC 7636.
 """
 
 from typing import Any, Final
+from urllib.parse import urlencode, urlsplit
 
 from authlib.oauth2.rfc7636 import create_s256_code_challenge
 from authlib.oidc.core import CodeIDToken
@@ -43,15 +44,19 @@ class OpenIdProvider(IdentityProvider):
         Tablets are shared: after a sign-out of iVeg nobody comes in by a session that
         the provider still has in this browser.
         """
-        return self._code_address(
-            (await self._discover())["authorization_endpoint"],
-            attempt,
-            scope=self.client.scopes,
-            prompt="login",
-            nonce=attempt.nonce,
-            code_challenge=create_s256_code_challenge(attempt.verifier),
-            code_challenge_method="S256",
-        )
+        url: str = (await self._discover())["authorization_endpoint"]
+        query = {
+            "response_type": "code",
+            "client_id": self.client.client_id,
+            "redirect_uri": attempt.back,
+            "state": attempt.state,
+            "scope": self.client.scopes,
+            "prompt": "login",
+            "nonce": attempt.nonce,
+            "code_challenge": create_s256_code_challenge(attempt.verifier),
+            "code_challenge_method": "S256",
+        }
+        return f"{url}{'&' if urlsplit(url).query else '?'}{urlencode(query)}"
 
     async def vouch(self, attempt: Attempt, code: str) -> Vouched:
         """Exchange the code of an attempt, and verify what comes for it."""
@@ -69,6 +74,24 @@ class OpenIdProvider(IdentityProvider):
                 user = info.body
         # What is signed comes last, and wins.
         return Vouched(text_of(claims, "sub"), {**user, **claims})
+
+    async def _redeem(self, url: str, attempt: Attempt, code: str) -> Json:
+        """Exchange a code at the token endpoint (RFC 6749, 4.1.3; RFC 7636, 4.5)."""
+        form = {
+            "grant_type": "authorization_code",
+            "code": code,
+            "redirect_uri": attempt.back,
+            "code_verifier": attempt.verifier,
+        }
+        login = None
+        if self.client.secret:
+            login = self.client.client_id, self.client.secret
+        else:
+            form["client_id"] = self.client.client_id
+        answer = await self._http.post(url, form, login)
+        if not answer.is_success:
+            raise SignOnError("untrusted", f"the code was refused: {answer.refusal}")
+        return answer.body
 
     async def _discover(self) -> Json:
         """The provider's description, whose addresses may be used. Raises HopError."""

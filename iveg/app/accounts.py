@@ -94,8 +94,7 @@ class Accounts:
         reading = ClaimReading(
             settings.sso_role_claim, settings.sso_name_claim, settings.sso_role_map
         )
-        lasts_s = settings.sso_hours * 3600.0
-        return authenticator, SingleSignOn(provider, reading, authenticator, lasts_s)
+        return authenticator, SingleSignOn(provider, reading, authenticator)
 
     def first_invitation(self) -> str | None:
         """An invitation for the first admin; None where somebody is admin already.

@@ -16,7 +16,7 @@ from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.history.engine import history_url, sqlite_file
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, spilled_file
-from iveg.adapters.identity_provider import Client, IdentityProvider, Keyrock
+from iveg.adapters.identity_provider import Client, IdentityProvider
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.journal import FileJournal
 from iveg.adapters.mqtt import BrokerAddress, MqttLink, TlsFiles
@@ -132,8 +132,6 @@ def open_provider(settings: Settings) -> IdentityProvider | None:
         settings.sso_client_secret,
         settings.sso_scopes,
     )
-    if settings.sso_provider == "keyrock":
-        return Keyrock(client)
     require_extra("sso", "IVEG_SSO_ISSUER")
     # Only here: without the extra the module cannot be imported.
     from iveg.adapters.oidc import OpenIdProvider

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal, TypeVar
 
-from iveg.domain.audit import Actor
+from iveg.domain.audit import CONSOLE, Actor
 from iveg.domain.errors import NameTakenError, SignOnError
 from iveg.domain.records import Json
 
@@ -21,8 +21,8 @@ SignInMethod = Literal["link", "password", "sso", "token"]
 OF_ACCOUNTS: Final = frozenset({"password", "sso"})
 """Methods of people with an account, which decides over their sessions."""
 PersonRole = Literal["viewer", "operator", "admin"]
-AccountState = Literal["active", "invited", "lapsed", "over", "disabled"]
-"""``lapsed``: the invitation was not taken in time; ``over``: ended by itself."""
+AccountState = Literal["active", "invited", "over", "disabled"]
+"""``over``: ended by itself."""
 TokenScope = Literal["read", "stop", "operate"]
 """Rights of a program: read; also stop; also release, resume and all else of people."""
 
@@ -93,13 +93,9 @@ class Account:
 
     def state(self, now: float) -> AccountState:
         """State of the account at this moment (Unix s)."""
-        if self.disabled:
-            return "disabled"
         if not self.is_open(now):
-            return "over"
-        if self.password or self.provider:
-            return "active"
-        return "invited" if self.invitation and now < self.invited_until else "lapsed"
+            return "disabled" if self.disabled else "over"
+        return "active" if self.password or self.provider else "invited"
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,20 +128,17 @@ class Session:
     Attributes:
         digest: SHA-256 of the token (hex).
         role: What they were when they came.
-        began: Unix time of the sign-in (s); ``seen`` of the last sign of life.
+        began: Unix time of the sign-in (s).
         person: Id of the account; empty in sessions of earlier versions.
         method: How they signed in.
-        until: When it is over at the latest (Unix s); None: no earlier than others.
     """
 
     digest: str
     name: str
     role: PersonRole
     began: float
-    seen: float
     person: str = ""
     method: SignInMethod = "link"
-    until: float | None = None
 
     @property
     def key(self) -> bytes:
@@ -179,11 +172,11 @@ class AccessChange:
         gone: It is kept no longer.
     """
 
-    by: Actor
     action: str
     row: Account | ApiToken
     details: Json = field(default_factory=dict)
     gone: bool = False
+    by: Actor = CONSOLE
 
 
 class AccessBook:
@@ -251,10 +244,10 @@ class AccessBook:
         self.keep()
 
     def open(self, session: Session) -> None:
-        """Let a session begin; of too many the one that was idle longest ends."""
+        """Let a session begin; of too many the oldest ends."""
         known = self.sessions
         if len(known) >= MOST_SESSIONS:
-            del known[min(known, key=lambda digest: known[digest].seen)]
+            del known[min(known, key=lambda digest: known[digest].began)]
         self.sessions[session.key] = session
         self.keep()
 
@@ -290,7 +283,7 @@ class ClaimReading:
 
     A path fits the shapes of the providers (docs/deployment.md, "Single sign-on"):
     ``realm_access.roles`` (Keycloak), ``roles`` or ``groups`` (Entra),
-    ``roles[].name`` (Keyrock).
+    ``roles[].name`` (lists of objects).
 
     Attributes:
         roles: Value of a claim → the role that it gives.

@@ -27,9 +27,6 @@ class SignInCode(Model):
 
     link: str
     image: str
-    local: bool = Field(
-        description="The address works on the server's own computer alone."
-    )
 
 
 class OwnAccount(Model):
@@ -63,7 +60,6 @@ class OpenSession(Model):
     role: str = Field(description="That is left now; `expired`: STOP alone.")
     kind: SessionKind
     began_at: Stamp
-    seen_at: Stamp = Field(description="The last request.")
     own: bool = Field(description="The one that asks.")
 
 
@@ -73,8 +69,7 @@ class UserAccount(Model):
     Attributes:
         user_id: The id is never given anew.
         name: The id is never given anew.
-        state: ``lapsed``: the invitation was not taken in time; ``over``: it ended by
-            itself.
+        state: ``over``: it ended by itself.
     """
 
     user_id: str

@@ -17,7 +17,7 @@ from iveg.settings import Settings
 from iveg.web.security.audited import AUDITED, READING
 from iveg.web.security.requirements import declared_action
 from iveg.web.security.roles import MAY, Action
-from iveg.web.security.sessions import IDLE_S
+from iveg.web.security.sessions import LASTS_S
 from tests.architecture import documents, security_table
 
 INTERFACES = documents.interfaces()
@@ -131,7 +131,7 @@ def _who(app: FastAPI, role: str) -> dict[str, str]:
     token = sessions.open("ana", "admin")
     digest = hashlib.sha256(token.encode()).digest()
     old = sessions._sessions[digest]
-    sessions._sessions[digest] = replace(old, began=old.began - IDLE_S * 2.5)
+    sessions._sessions[digest] = replace(old, began=old.began - LASTS_S * 1.5)
     return {**own, "Cookie": f"iveg={token}"}
 
 

@@ -94,9 +94,6 @@ def _age_sessions(stack: Site, seconds: float) -> None:
     """As if that much time had gone by while iVeg was away."""
     file = AccessFile(stack.directory / "accounts.jsonl")
     known = file.load()
-    aged = (
-        replace(one, began=one.began - seconds, seen=one.seen - seconds)
-        for one in known.sessions
-    )
+    aged = (replace(one, began=one.began - seconds) for one in known.sessions)
     file.save(replace(known, sessions=tuple(aged)))
     file.close()

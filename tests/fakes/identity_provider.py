@@ -125,7 +125,6 @@ class FakeIdentityProvider:
                 Route("/token", self._token, methods=["POST"]),
                 Route("/oauth2/token", self._token, methods=["POST"]),
                 Route("/userinfo", self._user_info),
-                Route("/user", self._keyrock_user),
             ]
         )
 
@@ -247,15 +246,6 @@ class FakeIdentityProvider:
         sub = "somebody-else" if self.vice == "other_user_info" else who
         told = self.people[who] if self.in_user_info else {}
         return JSONResponse({**told, "sub": sub})
-
-    async def _keyrock_user(self, request: Request) -> Response:
-        if (bad := await self._vice(request)) is not None:
-            return bad
-        who = self._tokens.get(request.query_params.get("access_token", ""))
-        if who is None:
-            return JSONResponse({"error": "invalid_token"}, 401)
-        app_id = "another" if self.vice == "other_app" else CLIENT
-        return JSONResponse({**self.people[who], "id": who, "app_id": app_id})
 
 
 @contextlib.asynccontextmanager

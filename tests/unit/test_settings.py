@@ -41,7 +41,6 @@ BAD = [
     ("IVEG_SSO_ISSUER", "http://idm.test", "an https address, or one of this machine"),
     ("IVEG_SSO_ROLES", "growers=owner", "values of the claim and roles"),
     ("IVEG_SSO_ROLES", "a=admin,a=viewer", "values of the claim and roles"),
-    ("IVEG_SSO_HOURS", "25", "a number of hours from 0.25 to 24"),
     ("IVEG_ON_LINK_LOSS", "drive", "one of stop, slow"),
 ]
 SECRET = [
@@ -145,7 +144,6 @@ GOOD = {
     "IVEG_SIGN_IN": "accounts",
     "IVEG_SIGN_IN_NAME": "Ana Núñez",
     "IVEG_SSO_ISSUER": "https://idm.test/realms/coop/",
-    "IVEG_SSO_PROVIDER": "keyrock",
     "IVEG_SSO_CLIENT_ID": "iveg",
     "IVEG_SSO_CLIENT_SECRET": "of the client",
     "IVEG_SSO_SCOPES": "openid",
@@ -153,7 +151,6 @@ GOOD = {
     "IVEG_SSO_ROLES": "growers=operator,owners = admin",
     "IVEG_SSO_NAME_CLAIM": "preferred_username",
     "IVEG_SSO_LABEL": "Cooperativa",
-    "IVEG_SSO_HOURS": "8",
     "IVEG_CONFIDENCE_THRESHOLD": "0.75",
     "IVEG_SAFETY_RADIUS_M": "2.0,robot=3.0",
     "IVEG_FORESIGHT": "off",

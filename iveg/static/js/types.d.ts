@@ -594,8 +594,6 @@ export type OpenSession = {
   role: string;
   kind: "link" | "account";
   began_at: string;
-  /** The last request. */
-  seen_at: string;
   /** The one that asks. */
   own: boolean;
 };
@@ -854,8 +852,6 @@ export type Server = {
 export type SignInCode = {
   link: string;
   image: string;
-  /** The address works on the server's own computer alone. */
-  local: boolean;
 };
 
 /** The worst that holds for a robot now, and what a person can do. */
@@ -994,7 +990,7 @@ export type UserAccount = {
   user_id: string;
   name: string;
   role: "viewer" | "operator" | "admin";
-  state: "active" | "invited" | "lapsed" | "over" | "disabled";
+  state: "active" | "invited" | "over" | "disabled";
   /** When it ends by itself; null: never. */
   ends_at: string | null;
   /** Null where no invitation waits. */

@@ -6,7 +6,6 @@ own: neither its token nor its digest leaves.
 """
 
 from functools import partial
-from ipaddress import ip_address
 from typing import Annotated
 
 import segno
@@ -73,9 +72,9 @@ def _add(routes: APIRouter, path: str, action: Action, *, everybodys: bool) -> N
 
     @routes.get(path, response_model=Listing[OpenSession])
     async def listed(request: Request, who: visitor) -> Response:
-        """Those that are not over; the newest sign of life first."""
+        """Those that are not over; the newest first."""
         seen = seen_by(request, who)
-        seen.sort(key=lambda shown: shown[0].seen, reverse=True)
+        seen.sort(key=lambda shown: shown[0].began, reverse=True)
         return Json(Listing(items=[_open_session(*shown, who) for shown in seen]))
 
     @routes.delete(f"{path}/{{session_id}}", response_model=OpenSession)
@@ -96,7 +95,6 @@ def _open_session(session: Session, role: Role, who: Principal) -> OpenSession:
         role=role,
         kind=kind,
         began_at=format_stamp(session.began),
-        seen_at=format_stamp(session.seen),
         own=session.key == who.session,
     )
 
@@ -133,7 +131,7 @@ def router(people: People) -> APIRouter:
         prove = authenticator_of(request).prove
         proof = partial(people.change_password, who, body.old, body.new)
         try:
-            return await prove(request, proof, "wrong password")
+            return await prove(request, proof)
         except HTTPException as error:
             if error.status_code != 401:
                 raise
@@ -148,17 +146,7 @@ def code_of(request: Request, proof: str) -> SignInCode:
     image = segno.make(link, micro=False).svg_data_uri(
         scale=_SCALE, border=4, dark="#000", light="#fff"
     )
-    return SignInCode(
-        link=link, image=image, local=_is_local(request.url.hostname or "")
-    )
-
-
-def _is_local(host: str) -> bool:
-    """Whether an address leads nowhere from another device."""
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost" or host.endswith(".localhost")
+    return SignInCode(link=link, image=image)
 
 
 class _Newcomer(Body):

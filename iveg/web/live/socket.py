@@ -36,8 +36,8 @@ from iveg.vital.publish import Hub, Subscriber
 from iveg.web.live.encoder import Encoder, frame_text
 from iveg.web.live.feed import SUBPROTOCOL, Painting, TelemetryFeed
 from iveg.web.presses import read_press
-from iveg.web.security.authentication import NO_SESSION, Authenticator
-from iveg.web.security.requirements import Reader
+from iveg.web.security.authentication import NO_SESSION
+from iveg.web.security.requirements import Reader, authenticator_of
 from iveg.web.security.roles import Action, Principal
 
 _MAX_MESSAGE = 65536
@@ -61,12 +61,9 @@ class BoundedSocket(WebSocketsSansIOProtocol):
             kernel.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
 
 
-def current_principal(
-    websocket: WebSocket, principal: Principal, action: Action
-) -> Principal | None:
-    """The session as of now; None: it may not."""
-    authenticator: Authenticator = websocket.app.state.authenticator
-    current = authenticator.current(principal)
+def current_principal(websocket: WebSocket, action: Action) -> Principal | None:
+    """The person or program as of now; None: it may not, or not any more."""
+    current = authenticator_of(websocket).identify(websocket)
     return current if current is not None and current.may(action) else None
 
 
@@ -138,7 +135,7 @@ class Line:
                     await self._websocket.close(TOO_SLOW)
             raise ConnectionAbortedError("reads too slowly") from error
 
-    async def listen(self, stop: Stop, principal: Principal) -> None:
+    async def listen(self, stop: Stop) -> None:
         """Take pings, presses and painted frames until the browser goes."""
         while self._websocket.application_state is WebSocketState.CONNECTED:
             raw = await self._websocket.receive_text()
@@ -157,13 +154,11 @@ class Line:
                     pong = {"t": message.get("t"), "server": self._clock().wall}
                     self._subscriber.append(topics.PONG.name, pong)
                 case "stop":
-                    await self._press(message, stop, principal)
+                    await self._press(message, stop)
 
-    async def _press(
-        self, message: dict[str, object], stop: Stop, principal: Principal
-    ) -> None:
+    async def _press(self, message: dict[str, object], stop: Stop) -> None:
         robot_id = message.get("robot_id")
-        who = current_principal(self._websocket, principal, "stop")
+        who = current_principal(self._websocket, "stop")
         if who is not None and (robot_id is None or isinstance(robot_id, str)):
             try:
                 await stop(robot_id, who, read_press(message))
@@ -173,11 +168,11 @@ class Line:
     def _complain(self, reason: str) -> None:
         self._subscriber.append(topics.PROBLEM.name, {"reason": reason})
 
-    async def watch(self, principal: Principal) -> None:
+    async def watch(self) -> None:
         """Close soon after the session is over.  STOP stays possible over HTTP."""
         while True:
             await asyncio.sleep(_CHECK_S)
-            if current_principal(self._websocket, principal, "read") is None:
+            if current_principal(self._websocket, "read") is None:
                 await self.close(NO_SESSION)
                 return
 
@@ -227,10 +222,10 @@ def router(
             async with asyncio.TaskGroup() as tasks:
                 others = [
                     tasks.create_task(line.send(), name="live-send"),
-                    tasks.create_task(line.watch(principal), name="live-watch"),
+                    tasks.create_task(line.watch(), name="live-watch"),
                 ]
                 with suppress(WebSocketDisconnect):
-                    await line.listen(stop, principal)
+                    await line.listen(stop)
                 for task in others:
                     task.cancel()
         except* (WebSocketDisconnect, ConnectionError) as gone:

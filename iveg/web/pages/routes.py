@@ -173,9 +173,9 @@ def _add_signing(routes: APIRouter, pages: Pages) -> None:
                 return authenticator.sign_in(request, body.token)
             case _ByPassword():
                 proof = partial(people.sign_in, body.name, body.password)
-                return await authenticator.prove(request, proof, "wrong password")
+                return await authenticator.prove(request, proof)
         proof = partial(people.accept, body.invitation, body.password)
-        return await authenticator.prove(request, proof, "no such invitation")
+        return await authenticator.prove(request, proof)
 
     # Whose session is past its age can end it, too.
     @routes.post(

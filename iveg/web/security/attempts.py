@@ -7,8 +7,7 @@ identity: no limit here stands before it.
 import logging
 import math
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable
-from typing import Final, NoReturn, TypeVar
+from typing import Final, NoReturn
 
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -25,93 +24,60 @@ REFUSED_ROWS: Final = 5.0
 """Rows of the audit a second for refused sign-ins, from all addresses together."""
 _MOST_ADDRESSES = 1024
 _log = logging.getLogger(__name__)
-_T = TypeVar("_T")
 
 
 class Attempts:
-    """Checks proofs of identity, counts the wrong ones and records them.
+    """Counts wrong proofs of identity and records them.
 
     Args:
         clock: Read at each of them.
         trail: Told of sign-ins, and of those that were refused.
-
-    Attributes:
-        refused: Wrong proofs so far.
     """
 
     def __init__(self, clock: Clock, trail: AuditTrail) -> None:
         self._clock, self._trail = clock, trail
         self._wrong: OrderedDict[str, Allowance] = OrderedDict()
-        now = clock().mono
         # Strangers' rows are kept for long: a flood from many addresses writes few.
-        self._rows = Allowance(REFUSED_ROWS, REFUSED_ROWS, now)
-        self._lines = Allowance(1.0, PER_S, now)
-        self.refused = 0
-
-    async def weigh(
-        self, request: Request, proof: Callable[[], Awaitable[_T | None]], wrong: str
-    ) -> _T:
-        """Check a proof, within the limit of wrong ones; returns what it proves.
-
-        Args:
-            request: Brings it.
-            proof: Checks it; None where it is wrong.
-            wrong: What the log says of one that proves nothing.
-
-        Raises:
-            HTTPException: 401, it is wrong; 429, there were too many wrong ones.
-            BusyError: too many sign in at once.
-        """
-        # Before it is checked: each check takes a while of a processor, and a limit
-        # that the right password passes is none against guessing.
-        self.refuse_waiting(request)
-        found = await proof()
-        if found is None:
-            self.refuse(request, wrong)
-        return found
-
-    def refuse(self, request: Request, wrong: str) -> NoReturn:
-        """Count a proof that proves nothing, and refuse it.
-
-        Raises:
-            HTTPException: always.
-        """
-        self.refuse_waiting(request)
-        self.count(request)
-        self.note_refused(request)
-        self.refused += 1
-        if self._lines.admit(self._clock().mono):
-            _log.warning("sign-in refused: %s (%d so far)", wrong, self.refused)
-        raise HTTPException(401, "This link does not sign in here, or not any more.")
+        self._rows = Allowance(REFUSED_ROWS, REFUSED_ROWS, clock().mono)
 
     def refuse_waiting(self, request: Request) -> None:
-        """Refuse an address that has to wait. Raises HTTPException (429)."""
+        """Refuse an address that has to wait. Raises HTTPException (429).
+
+        Before a password is checked: each check takes a while of a processor, and a
+        limit that the right password passes is none against guessing.
+        """
         allowance = self._wrong.get(client_of(request))
         wait_s = allowance.wait_s(self._clock().mono) if allowance else 0.0
         if wait_s > 0.0:
             detail = "Too many wrong sign-ins came from your address; wait a minute."
             raise HTTPException(429, detail, {"Retry-After": str(math.ceil(wait_s))})
 
-    def count(self, request: Request) -> None:
-        """Count a wrong proof of an address; of too many addresses the oldest goes."""
+    def refuse(self, request: Request) -> NoReturn:
+        """Count a proof that proves nothing, and refuse it.
+
+        Raises:
+            HTTPException: always.
+        """
+        self.refuse_waiting(request)
         address, now = client_of(request), self._clock().mono
         allowance = self._wrong.setdefault(address, Allowance(SIGN_INS, PER_S, now))
         allowance.admit(now)
         self._wrong.move_to_end(address)
         if len(self._wrong) > _MOST_ADDRESSES:
             self._wrong.popitem(last=False)
+        self.note_refused(request)
+        raise HTTPException(401, "This link does not sign in here, or not any more.")
 
     def note(self, actor: Actor, action: str, request: Request, **facts: str) -> None:
         """Write a sign-in, or one that was refused, into the audit."""
         details = {"address": client_of(request), **facts}
         self._trail.note(actor, action, details=details, at=self._clock())
 
-    def note_refused(self, request: Request, **facts: str) -> bool:
-        """Write a refused sign-in into the audit; False: there were too many."""
-        is_kept = self._rows.admit(self._clock().mono)
-        if is_kept:
+    def note_refused(self, request: Request, **facts: str) -> None:
+        """Write a refused sign-in into audit and log, unless there were too many."""
+        if self._rows.admit(self._clock().mono):
             self.note(STRANGER, "sign_in_refused", request, **facts)
-        return is_kept
+            _log.warning("sign-in refused: %s", facts or "wrong proof")
 
 
 def client_of(request: Request) -> str:

@@ -87,27 +87,29 @@ class Authenticator:
         refuse_forgery(request)
         # Somebody else's wrong links must not shut out whoever has the right one.
         if not same_secret(token, self._credentials.link):
-            self.attempts.refuse(request, "wrong token")
+            self.attempts.refuse(request)
         self._end_before(request)
         name = self._credentials.link_name
         cookie = self.sessions.open(name, "operator", LINK_PERSON)
         return self.admit(request, cookie, Response(status_code=204))
 
     async def prove(
-        self,
-        request: Request,
-        proof: Callable[[], Awaitable[Account | None]],
-        wrong: str,
+        self, request: Request, proof: Callable[[], Awaitable[Account | None]]
     ) -> Response:
         """Exchange a proof for a session cookie; raises as ``sign_in``.
 
         Args:
             request: Brings it.
             proof: Finds the account that it proves; None where it is wrong.
-            wrong: What the log says of one that proves nothing.
+
+        Raises:
+            BusyError: too many sign in at once.
         """
         refuse_forgery(request)
-        account = await self.attempts.weigh(request, proof, wrong)
+        self.attempts.refuse_waiting(request)
+        account = await proof()
+        if account is None:
+            self.attempts.refuse(request)
         self._end_before(request)
         cookie = self.sessions.open(
             account.name, account.role, account.account_id, "password"
@@ -161,12 +163,6 @@ class Authenticator:
         secure = connection.scope["scheme"] in ("https", "wss")
         cookie = connection.cookies.get(session_cookie(secure=secure))
         return None if cookie is None else self.sessions.find(cookie)
-
-    def current(self, principal: Principal) -> Principal | None:
-        """Person or program as of now, with the role that is left; None: gone."""
-        if principal.session is not None or principal == PROGRAM:
-            return self.sessions.current(principal)
-        return self.people.current_program(principal)
 
     def authorise(self, request: Request, action: Action) -> Principal:
         """Let a request in, or say why not.

@@ -9,7 +9,6 @@ from iveg.adapters.passwords import Passwords
 from iveg.domain.accounts import (
     AccessBook,
     Account,
-    ApiToken,
     TokenScope,
     digest_of,
     find_named,
@@ -122,19 +121,8 @@ class People:
         if known.used_at is None or abs(now - known.used_at) >= _USED_S:
             self.book.tokens[known.digest] = replace(known, used_at=now)
             self.book.keep()
-        return _principal(known)
-
-    def current_program(self, principal: Principal) -> Principal | None:
-        """Program as of now; None where its token has ended."""
-        for token in self.book.tokens.values():
-            if token.token_id == principal.person and token.is_open(self.clock().wall):
-                return _principal(token)
-        return None
+        return Principal(known.name, _ROLES[known.scope], known.token_id, "token")
 
     def close(self) -> None:
         """End the thread of passwords."""
         self._passwords.close()
-
-
-def _principal(token: ApiToken) -> Principal:
-    return Principal(token.name, _ROLES[token.scope], token.token_id, "token")

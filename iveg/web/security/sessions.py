@@ -3,9 +3,8 @@
 Only digests of their tokens are kept.  Ages follow the wall clock, because no other
 goes on counting while iVeg is down::
 
-    signed in ──12 h idle, or 24 h──> expired: STOP alone ──12 h──> gone
-        ├──────── a viewer: 30 days ──────^
-        └──────── signed out ─────────────────────────────────────> gone
+    signed in ──12 h, a viewer 30 days──> expired: STOP alone ──12 h──> gone
+        └─────────────── signed out ──────────────────────────────────> gone
 """
 
 import hashlib
@@ -23,24 +22,19 @@ from iveg.domain.accounts import (
 from iveg.vital.ports import Clock
 from iveg.web.security.roles import Principal, Role
 
-IDLE_S, ABSOLUTE_S, STOP_ONLY_S = 12 * 3600.0, 24 * 3600.0, 12 * 3600.0
+LASTS_S, STOP_ONLY_S = 12 * 3600.0, 12 * 3600.0
 VIEWER_S = 30 * 86400.0
 """Shared screens look and stop, and nobody signs them in each morning."""
 
 
 def role_at(session: Session, now: float) -> Role | None:
     """The role that is left at ``now`` (Unix s); None when all is over."""
-    ends = min(session.seen + IDLE_S, session.began + ABSOLUTE_S)
-    if session.role == "viewer":
-        ends = session.began + VIEWER_S
-    over = now - (ends if session.until is None else min(ends, session.until))
+    # The provider gives a role anew at each sign-in.
+    is_long = session.role == "viewer" and session.method != "sso"
+    over = now - session.began - (VIEWER_S if is_long else LASTS_S)
     if over <= 0:
         return session.role
     return "expired" if over <= STOP_ONLY_S else None
-
-
-_KEEP_SEEN_S = 60.0
-"""A crash forgets at most this much of a sign of life."""
 
 
 class Sessions:
@@ -53,8 +47,10 @@ class Sessions:
 
     def __init__(self, clock: Clock, book: AccessBook) -> None:
         self._clock, self._book = clock, book
-        self._kept_at = 0.0
-        self._remember()
+        now = clock().wall
+        for digest, session in [*self._sessions.items()]:
+            # A clock that was ahead must not have made a session that never ends.
+            self._sessions[digest] = replace(session, began=min(session.began, now))
 
     @property
     def _sessions(self) -> dict[bytes, Session]:
@@ -66,7 +62,6 @@ class Sessions:
         role: Role,
         person: str = "",
         method: SignInMethod = "link",
-        until: float | None = None,
     ) -> str:
         """Begin a session; returns its token, which is stored nowhere.
 
@@ -75,31 +70,24 @@ class Sessions:
             role: What they are.
             person: Id of the account.
             method: How they signed in.
-            until: When it is over at the latest (Unix s).
         """
         token = secrets.token_urlsafe(32)
         now = self._clock().wall
         digest = _digest(token)
         theirs = cast("PersonRole", role)
-        began = Session(digest.hex(), name, theirs, now, now, person, method, until)
+        began = Session(digest.hex(), name, theirs, now, person, method)
         self._book.open(began)
         return token
 
     def find(self, token: str) -> Principal | None:
-        """The owner of this token; counts as a sign of life."""
-        return self._principal(_digest(token), touch=True)
-
-    def current(self, principal: Principal) -> Principal | None:
-        """Person as of now, with the role that is left; None: gone."""
-        if principal.session is None:
-            return principal
-        return self._principal(principal.session, touch=False)
+        """The owner of this token; None: nobody's, or nobody's any more."""
+        return self._principal(_digest(token))
 
     def standing(self) -> list[tuple[Session, Role]]:
         """Those that are not over, each with the role that is left of it."""
         found = []
         for digest in [*self._sessions]:
-            who = self._principal(digest, touch=False)
+            who = self._principal(digest)
             if who is not None:
                 found.append((self._sessions[digest], who.role))
         return found
@@ -107,22 +95,16 @@ class Sessions:
     def end(self, digest: bytes) -> None:
         """End the one of this digest at once, STOP included."""
         self._sessions.pop(digest, None)
-        self._keep()
+        self._book.keep()
 
-    def _principal(self, digest: bytes, *, touch: bool) -> Principal | None:
+    def _principal(self, digest: bytes) -> Principal | None:
         session = self._sessions.get(digest)
         if session is None:
             return None
-        now = self._clock().wall
-        role = self._role(session, now)
+        role = self._role(session, self._clock().wall)
         if role is None:
-            del self._sessions[digest]
-            self._keep()
+            self.end(digest)
             return None
-        if touch and role != "expired":
-            self._sessions[digest] = replace(session, seen=now)
-            if abs(now - self._kept_at) >= _KEEP_SEEN_S:
-                self._keep()
         return Principal(
             session.name,
             role,
@@ -144,18 +126,6 @@ class Sessions:
         is_theirs = session.role in (account.role, "viewer")
         is_theirs &= account.is_open(now) and session.began >= account.since
         return role if is_theirs else None
-
-    def _remember(self) -> None:
-        """Take in those of earlier runs."""
-        now = self._clock().wall
-        for digest, session in [*self._sessions.items()]:
-            # A clock that was ahead must not have made a session that never ends.
-            began, seen = min(session.began, now), min(session.seen, now)
-            self._sessions[digest] = replace(session, began=began, seen=seen)
-
-    def _keep(self) -> None:
-        self._kept_at = self._clock().wall
-        self._book.keep()
 
 
 def _digest(token: str) -> bytes:

@@ -2,7 +2,7 @@
 
 A browser goes to the provider and comes back with a code, which iVeg exchanges::
 
-    begin ──> provider's page ──> finish ──> session, at most IVEG_SSO_HOURS
+    begin ──> provider's page ──> finish ──> session, at most 12 h
                                      └─────> refused: why, on the page and in the audit
 
 An attempt waits in a sealed cookie of the browser that began it; the server keeps none.
@@ -10,7 +10,6 @@ An attempt waits in a sealed cookie of the browser that began it; the server kee
 
 import asyncio
 import contextlib
-import logging
 import re
 from collections.abc import AsyncIterator
 from typing import Final
@@ -34,7 +33,6 @@ from iveg.web.security.secrets import same_secret
 CALLBACK: Final = "/signin/sso/callback"
 _MOST_TOGETHER = 8
 _OWN_PATH: Final = re.compile(r"/(?![/\\])[!-\[\]-~]{0,500}")
-_log = logging.getLogger(__name__)
 
 
 class SingleSignOn:
@@ -44,7 +42,6 @@ class SingleSignOn:
         provider: Vouches for them.
         reading: Where name and role stand in what it says.
         authenticator: Keeps their accounts and sessions.
-        lasts_s: How long a session lasts (s).
     """
 
     def __init__(
@@ -52,10 +49,9 @@ class SingleSignOn:
         provider: IdentityProvider,
         reading: ClaimReading,
         authenticator: Authenticator,
-        lasts_s: float,
     ) -> None:
         self._provider, self._reading = provider, reading
-        self._authenticator, self._lasts_s = authenticator, lasts_s
+        self._authenticator = authenticator
         self._clock = authenticator.people.clock
         self._attempts = SealedAttempts()
         self._exchanges = asyncio.Semaphore(_MOST_TOGETHER)
@@ -125,9 +121,8 @@ class SingleSignOn:
         """Begin the session of a person who was vouched for; returns its token."""
         by = Actor(told.name, told.role, told.account_id, "sso")
         account = self._authenticator.people.admission(by).vouched(told)
-        until = self._clock().wall + self._lasts_s
         return self._authenticator.sessions.open(
-            account.name, account.role, account.account_id, "sso", until
+            account.name, account.role, account.account_id, "sso"
         )
 
     @contextlib.asynccontextmanager
@@ -143,8 +138,7 @@ class SingleSignOn:
 
     def _note_refused(self, request: Request, error: SignOnError) -> None:
         facts = {"by": "sso", "why": error.failure, "detail": error.detail}
-        if self._authenticator.attempts.note_refused(request, **facts):
-            _log.warning("sign-in by the provider refused: %s", error)
+        self._authenticator.attempts.note_refused(request, **facts)
 
 
 def _code(request: Request) -> str:

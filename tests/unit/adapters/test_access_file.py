@@ -9,11 +9,10 @@ import pytest
 
 from iveg.adapters.access_file import AccessFile
 from iveg.domain.accounts import Access, AccessChange, Account, ApiToken, Session
-from iveg.domain.audit import CONSOLE
 
 ANA = Account("P1", "Ana", "operator", password="#hash", since=12.5)
 MES = ApiToken("T1", "MES", "stop", "ab" * 32, 1.0)
-KEPT = Access((ANA,), (MES,), (Session("cd" * 32, "Ana", "operator", 1.0, 2.0, "P1"),))
+KEPT = Access((ANA,), (MES,), (Session("cd" * 32, "Ana", "operator", 1.0, "P1"),))
 
 
 @pytest.fixture
@@ -119,8 +118,8 @@ async def test_a_disk_that_fails_is_told_once_and_tried_again(
 async def test_a_change_of_the_console_waits_until_the_server_drops_it(
     path: Path, file: AccessFile
 ) -> None:
-    change = AccessChange(CONSOLE, "account_role", ANA, {"role": "operator"})
-    revoked = AccessChange(CONSOLE, "token_revoked", MES, gone=True)
+    change = AccessChange("account_role", ANA, {"role": "operator"})
+    revoked = AccessChange("token_revoked", MES, gone=True)
     console = AccessFile(path)
     console.leave(change)
     console.leave(revoked)

@@ -6,13 +6,12 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 
-from iveg.adapters.identity_provider import Attempt, Client, Keyrock, Vouched
+from iveg.adapters.identity_provider import Attempt, Client, Vouched
 from iveg.adapters.oidc import OpenIdProvider
 from iveg.domain.errors import HopError, SignOnError
 from tests.fakes.identity_provider import (
     CLIENT,
     KEYCLOAK,
-    KEYROCK,
     SECRET,
     FakeIdentityProvider,
     own_url,
@@ -37,9 +36,7 @@ async def openid(provider: FakeIdentityProvider) -> AsyncIterator[OpenIdProvider
     await made.close()
 
 
-async def vouched(
-    openid: OpenIdProvider | Keyrock, provider: FakeIdentityProvider
-) -> Vouched:
+async def vouched(openid: OpenIdProvider, provider: FakeIdentityProvider) -> Vouched:
     attempt = Attempt(BACK)
     back = provider.approve(await openid.address(attempt), "ana-1")
     return await openid.vouch(attempt, parse_qs(urlsplit(back).query)["code"][0])
@@ -185,22 +182,6 @@ async def test_a_bad_provider_is_refused_in_bounded_time_and_memory(
 
     assert len(provider.asked) <= 5
     assert time.monotonic() - begun < 5.0
-
-
-async def test_keyrock_tells_who_it_is_at_its_own_address(
-    provider: FakeIdentityProvider,
-) -> None:
-    provider.people = {"ana-1": dict(KEYROCK)}
-    keyrock = Keyrock(Client(provider.url, CLIENT, SECRET, ""))
-
-    proof = await vouched(keyrock, provider)
-    provider.vice = "other_app"
-    with pytest.raises(SignOnError, match="another application"):
-        await vouched(keyrock, provider)
-    await keyrock.close()
-
-    assert proof.subject == "ana-1"
-    assert proof.claims["roles"] == KEYROCK["roles"]
 
 
 def test_nothing_that_is_secret_is_shown_by_a_traceback() -> None:

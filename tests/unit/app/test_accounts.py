@@ -11,7 +11,6 @@ import pytest
 from iveg.adapters.access_file import AccessFile
 from iveg.app.accounts import Accounts
 from iveg.domain.accounts import AccessChange, Account, ApiToken
-from iveg.domain.audit import CONSOLE
 from iveg.domain.errors import HopError
 from iveg.domain.records import AuditRecord
 from iveg.vital.audit import AuditTrail
@@ -79,7 +78,7 @@ async def test_who_was_in_the_tables_is_copied_once(house: House) -> None:
     with pytest.raises(HopError):
         first.first_invitation()
     await first.copy_earlier()
-    revoked = AccessChange(CONSOLE, "token_revoked", MES, gone=True)
+    revoked = AccessChange("token_revoked", MES, gone=True)
     first.book.apply(revoked)
     # With a file no database is asked any more: an older one brings nobody back.
     house.url, url = "sqlite:////nowhere/history.db", house.url
@@ -125,8 +124,8 @@ async def test_a_change_of_the_console_counts_at_once_and_has_its_row(
     running = asyncio.create_task(accounts.run())
 
     off = replace(ANA, disabled=True)
-    console.leave(AccessChange(CONSOLE, "account_disabled", off))
-    console.leave(AccessChange(CONSOLE, "account_added", replace(ANA, account_id="P2")))
+    console.leave(AccessChange("account_disabled", off))
+    console.leave(AccessChange("account_added", replace(ANA, account_id="P2")))
     await until(lambda: bool(house.acts()))
     await accounts._file.look()
     running.cancel()

@@ -22,7 +22,7 @@ from iveg.domain.transports import DIRECT, FIWARE, Transport
 from iveg.settings import Settings
 from iveg.vital.ports import CommandPort, Ports
 from iveg.web.security.roles import MAY
-from iveg.web.security.sessions import IDLE_S
+from iveg.web.security.sessions import LASTS_S
 from tests.databases import lay_history
 from tests.fakes.context_broker import FakeContextBroker
 from tests.fakes.fleet import FakeFleet
@@ -118,7 +118,7 @@ def _headers_of_roles(app: FastAPI) -> dict[str, dict[str, str]]:
     token = sessions.open("ana", "admin")
     digest = hashlib.sha256(token.encode()).digest()
     old = sessions._sessions[digest]
-    sessions._sessions[digest] = replace(old, began=old.began - IDLE_S * 2.5)
+    sessions._sessions[digest] = replace(old, began=old.began - LASTS_S * 1.5)
     told["expired"] = {**page, "Cookie": f"iveg={token}"}
     told["program"] = {"Authorization": f"Bearer {API_TOKEN}"}
     return {**told, STRANGER: page}

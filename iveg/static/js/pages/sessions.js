@@ -4,7 +4,7 @@
 
 import { sendApi } from "../core/api.js";
 import { make, need, setText } from "../panels/dom.js";
-import { createAges, keepFresh } from "./ages.js";
+import { keepFresh } from "./ages.js";
 import { dayAndTime } from "./history/local_time.js";
 import { createRows } from "./rows.js";
 import { makeTwice } from "./twice.js";
@@ -21,14 +21,13 @@ export const startOwnSessions = (page) => createSessions(page, "account/sessions
 /** @param {Page} page @param {string} path below `/api/v1/` */
 function createSessions(page, path) {
   const { i18n } = page;
-  const aged = createAges(page);
   const rows = createRows({ name: "sessions", path, i18n, cells });
   const label = (/** @type {string} */ key, slots = {}) =>
     i18n.t(`sessionspage.${key}`, slots);
 
   /** @param {Session} session */
   function cells(session) {
-    const { session_id, name, role, kind, began_at, seen_at, own } = session;
+    const { session_id, name, role, kind, began_at, own } = session;
     const change = make("td", "", own ? label("own") : "");
     const end = () => finish(session_id, name);
     if (!own) change.append(makeTwice(label("end"), label("end_sure", { name }), end));
@@ -37,7 +36,6 @@ function createSessions(page, path) {
       make("td", "", i18n.t(`header.role.${role}`)),
       make("td", "", label(`kind.${kind}`)),
       make("td", "time named", dayAndTime(began_at)),
-      aged(seen_at),
       change,
     ];
   }

@@ -38,7 +38,7 @@ export function start({ i18n }) {
     once.hide();
     if (!body.code) return once.say("userspage.changed", { name });
     const until = dayAndTime(body.user.invited_until);
-    once.say(body.code.local ? "userspage.local" : "userspage.given", { name, until });
+    once.say("userspage.given", { name, until });
     return once.show(body.code.link, body.code.image);
   }
 

@@ -114,7 +114,6 @@ def test_a_flood_of_wrong_sign_ins_from_everywhere_writes_few_rows(
             desk.authenticator.sign_in(_request(address), "x")
 
     assert len(audited(desk)) == 5
-    assert desk.authenticator.attempts.refused == 500
 
 
 def _request(address: str) -> Request:
