@@ -6,7 +6,7 @@ says how long it takes at least now, so that a path that stops is not taken for 
 one::
 
     sent    1    2    3    4    5
-    back    +1.0 +1.5                →  now, 4 s after 3 left: 4.0 s behind, growing
+    back    +1.0 +1.5                →  now, 4 s after 3 left: 4.0 s behind
 
 A probe that a later one has overtaken no longer counts: it may be lost for ever.
 
@@ -123,10 +123,10 @@ class ProbeLag:
         return self._back[0][1] if self._back else 0.0
 
 
-def lag_in_words(lag_s: float, *, growing: bool = False) -> str:
+def lag_in_words(lag_s: float) -> str:
     """A lag as the log, programs and ``iveg doctor`` say it."""
     late = f"{lag_s:.0f}" if lag_s >= 10.0 else f"{lag_s:.1f}"
-    return f"measures reach Orion {late} s late" + (", growing" if growing else "")
+    return f"measures reach Orion {late} s late"
 
 
 def stopped_in_words(lag_s: float | None) -> str:

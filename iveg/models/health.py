@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field
 
-from iveg.domain.latency import Data, Window
+from iveg.domain.latency import Data
 from iveg.domain.recordings import RecordingFile
 from iveg.models.base import Hundredth, Model, Stamp, Tenth
 
@@ -24,7 +24,6 @@ class HopHealth(Model):
         age_s: Of the evidence (s).
         key: Its sentence.
         detail: What else is known.
-        growing: The lag grows.
     """
 
     hop: str
@@ -33,7 +32,6 @@ class HopHealth(Model):
     key: str
     detail: str
     lag_s: Tenth | None = Field(description="How late measures pass it, at least.")
-    growing: bool
 
 
 class Health(Model):
@@ -100,17 +98,15 @@ class LatencyClock(Model):
 
 
 class LatencyTable(Model):
-    """Every hop of every kind of data over one window.
+    """Every hop of every kind of data over the last 15 minutes.
 
     Attributes:
         at: When.
-        window: The window.
         rows: One for each kind of data.
         clocks: One for each robot.
     """
 
     at: str
-    window: Window
     robot: str | None = Field(description="Null: all robots.")
     direct: bool = Field(
         description=(

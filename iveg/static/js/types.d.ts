@@ -460,7 +460,6 @@ export type HopHealth = {
   detail: string;
   /** How late measures pass it, at least. */
   lag_s: number | null;
-  growing: boolean;
 };
 
 /** An account with the link that begins it, which is shown this once. */
@@ -508,10 +507,9 @@ export type LatencyRow = {
   hops: Record<string, SegmentSpread>;
 };
 
-/** Every hop of every kind of data over one window. */
+/** Every hop of every kind of data over the last 15 minutes. */
 export type LatencyTable = {
   at: string;
-  window: "1min" | "15min" | "24h";
   /** Null: all robots. */
   robot: string | null;
   /** Whether iVeg reads the broker itself, so that Δt₁ and Δt₂ are two numbers. */

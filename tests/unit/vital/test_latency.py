@@ -20,7 +20,7 @@ def say(desk: Desk, *transports: TransportId, after_s: float = 0.0) -> None:
 
 def took(desk: Desk, hop: Segment) -> Sketch:
     stream = desk.latency.streams[0]
-    return merged(stream.segments[hop].parts("1min"))
+    return merged(stream.segments[hop].parts())
 
 
 def test_a_copy_that_comes_twice_counts_once() -> None:

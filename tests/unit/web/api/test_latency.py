@@ -25,7 +25,7 @@ def drive(desk: WebDesk, seconds: float) -> None:
         desk.loop.step(desk.ingest.drain(), desk.clock())
 
 
-async def ask(desk: WebDesk, query: str = "window=1min") -> dict[str, Any]:
+async def ask(desk: WebDesk, query: str = "") -> dict[str, Any]:
     async with desk.program() as program:
         answer = await program.get(f"/api/v1/latency?{query}")
     assert answer.status_code == 200, answer.text

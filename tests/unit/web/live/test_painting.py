@@ -21,7 +21,7 @@ def watching() -> tuple[LatencyWatch, Painting]:
 
 
 def took(watch: LatencyWatch) -> Sketch:
-    return merged(watch.streams[0].segments["screen"].parts("1min"))
+    return merged(watch.streams[0].segments["screen"].parts())
 
 
 def send(painting: Painting, number: int, now: float) -> None:
