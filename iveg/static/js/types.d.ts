@@ -662,7 +662,6 @@ export type Person = {
   decision_id: string | null;
   lane: string | null;
   acting: Acting[];
-  margin: Margin | null;
   /** The mark by which it is no person and has no zone. */
   thing_id: string | null;
 };

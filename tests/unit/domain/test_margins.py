@@ -126,9 +126,6 @@ def test_all_pairs_at_once_are_the_pairs_one_by_one() -> None:
         for robot_id in scene.robots:
             mine = [one for one in ranked if one.robot_id == robot_id]
             assert margins(scene).of_robot(robot_id) == mine[0]
-        for somebody in scene.everyone:
-            its = [one for one in ranked if one.person_id == somebody.person_id]
-            assert margins(scene).of_person(somebody.person_id) == its[0]
 
 
 def test_without_robots_or_people_there_is_no_margin() -> None:
@@ -136,5 +133,5 @@ def test_without_robots_or_people_there_is_no_margin() -> None:
     nobody = LeastMargins([], scene.everyone, at(0.0))
     alone = LeastMargins(scene.world.robots.values(), [], at(0.0))
 
-    assert nobody.of_person(scene.everyone[0].person_id) is None
+    assert nobody.of_robot("AGI") is None
     assert alone.of_robot("AGI") is None
