@@ -225,12 +225,8 @@ export type Coverage = {
 
 /** One decision: detection, observer, rule, and the robot's reaction. */
 export type Decision = {
-  position: Position | null;
-  rule: DecisionRule;
   links: DecisionLink[];
   sentence: Sentence;
-  /** Poses of the robot and its observer; empty for those of the earlier version. */
-  places: DecisionPlace[];
   /** The decision (ULID). */
   decision_id: string;
   /** `alert` (somebody was confirmed) or `mandate` (a speed limit). */
@@ -289,21 +285,6 @@ export type DecisionLink = {
   at: string | null;
   value: JsonValue;
   verdict: string;
-};
-
-/** Pose of a robot when a decision began, in ``map`` (m, rad). */
-export type DecisionPlace = {
-  robot_id: string;
-  x: number;
-  y: number;
-  yaw: number;
-};
-
-/** The rule that fired, as it was at that moment. */
-export type DecisionRule = {
-  id: string | null;
-  version: string | null;
-  parameters: JsonValue;
 };
 
 /** One box of one detection frame, placed in ``map``. */
