@@ -208,10 +208,9 @@ class HealthMonitor:
         return min(_LONGEST_GAP_S, max(DOWN_S, 2 * self._gap_s))
 
     def is_overloaded(self, now: Instant) -> bool:
-        """Whether measures pass the agent ever later: nothing may be added to it."""
+        """Whether measures pass the agent late: nothing may be added to it."""
         _, state = self._passing(now)
-        passing = state in ("ok", "late")
-        return passing and self._was_behind and self.probe.grows(now)
+        return state in ("ok", "late") and self._was_behind
 
     def _passing(self, now: Instant) -> tuple[float | None, HopState]:
         """Age of the newest measure that passed the agent (s), and its verdict."""

@@ -22,7 +22,7 @@ def sent(*moments: float) -> ProbeLag:
 def test_nothing_is_known_before_the_first_probe() -> None:
     lag = ProbeLag()
 
-    assert (lag.lag(at(5.0)), lag.is_known, lag.grows(at(5.0))) == (None, False, False)
+    assert (lag.lag(at(5.0)), lag.is_known) == (None, False)
 
 
 def test_the_newest_probe_that_came_back_tells_the_lag() -> None:
@@ -63,30 +63,3 @@ def test_a_copy_a_straggler_or_a_probe_of_an_earlier_life_says_nothing(
     lag.returned(later, at(40.0))
 
     assert lag.lag(at(40.0)) == 0.5
-
-
-@pytest.mark.parametrize(
-    ("transits", "grows"),
-    [
-        ([0.3 * n for n in range(12)], True),
-        ([12.0] * 12, False),
-        ([12.0 - n for n in range(12)], False),
-    ],
-    ids=["longer", "as it is", "drains"],
-)
-def test_a_backlog_grows_while_probes_take_longer(
-    transits: list[float], *, grows: bool
-) -> None:
-    lag = sent(*(2.0 * n for n in range(12)))
-    for seq, transit in enumerate(transits):
-        lag.returned(probe(seq + 1), at(2.0 * seq + transit))
-
-    assert lag.grows(at(22.0 + transits[-1])) is grows
-
-
-def test_a_chain_that_stops_grows() -> None:
-    lag = sent(0.0, 2.0)
-    lag.returned(probe(1), at(0.1))
-
-    assert not lag.grows(at(2.2))
-    assert lag.grows(at(5.0))
