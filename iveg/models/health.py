@@ -18,8 +18,7 @@ class HopHealth(Model):
     """One hop of the data path from robot to screen.
 
     Attributes:
-        hop: ``mqtt``, ``orion``, ``iot_agent``, ``notifications``, ``database`` or
-            ``emulator``.
+        hop: ``mqtt``, ``orion``, ``iot_agent``, ``notifications`` or ``database``.
         state: How it is.
         age_s: Of the evidence (s).
         key: Its sentence.

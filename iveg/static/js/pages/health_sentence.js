@@ -15,14 +15,7 @@
 import { isSilent, linkOfRobot } from "../core/clock.js";
 
 /** In the order of the data path; then the hops beside it. */
-export const ORDER = [
-  "mqtt",
-  "iot_agent",
-  "orion",
-  "notifications",
-  "database",
-  "emulator",
-];
+export const ORDER = ["mqtt", "iot_agent", "orion", "notifications", "database"];
 /** From this lag on (s), the lag itself is the fault. */
 const LATE_S = 1;
 /** @type {State[]} */
