@@ -43,7 +43,11 @@ _DEVICES_PERIOD_S = 12.0
 
 
 class Provisioner:
-    """Provisioning, subscriptions, reconciling reads and the heartbeat probe."""
+    """Provisioning, subscriptions, reconciling reads and the heartbeat probe.
+
+    Attributes:
+        subscription_ids: Ids of our subscriptions.
+    """
 
     def __init__(
         self,
@@ -60,14 +64,9 @@ class Provisioner:
         self._devices_at = self._unanswered_until = 0.0
         self._broken: set[str] = set()
         self._gap = asyncio.Event()
-        self._subscription_ids: frozenset[str] = frozenset()
+        self.subscription_ids: frozenset[str] = frozenset()
         self._former_secrets: frozenset[str] = frozenset()
         self._is_subscribing = False
-
-    @property
-    def subscription_ids(self) -> frozenset[str]:
-        """Ids of our subscriptions."""
-        return self._subscription_ids
 
     def is_ours(self, subscription_id: str) -> bool:
         """Whether a notification is one that was asked for.
@@ -77,9 +76,9 @@ class Provisioner:
         the first are known, each that brings our secret is ours.
         """
         return (
-            subscription_id in self._subscription_ids
+            subscription_id in self.subscription_ids
             or self._is_subscribing
-            or not self._subscription_ids
+            or not self.subscription_ids
         )
 
     def is_former(self, secret: str) -> bool:
@@ -87,7 +86,7 @@ class Provisioner:
 
         Until Orion has said which subscriptions have our name, any may be.
         """
-        return secret in self._former_secrets or not self._subscription_ids
+        return secret in self._former_secrets or not self.subscription_ids
 
     async def run(self) -> None:
         """Until cancelled."""
@@ -234,8 +233,8 @@ class Provisioner:
         finally:
             self._is_subscribing = False
         # What is made at the start was never missed.
-        missed = _in_short(done.mended) if self._subscription_ids else ""
-        self._subscription_ids = done.ids
+        missed = _in_short(done.mended) if self.subscription_ids else ""
+        self.subscription_ids = done.ids
         self._former_secrets |= done.former_secrets
         _explain(done.mended)
         monitor.notify_detail, monitor.notify_error = done.failing, missed

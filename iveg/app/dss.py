@@ -63,8 +63,6 @@ from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)
 Work = Callable[[], Awaitable[object]]
-EARLIER_LINES = 200
-"""Lines of the log that come back after a restart."""
 _ASK_AGAIN_S = 5.0
 LAST_WORD_S = 0.5
 """Time that the last word may take; robots slow by themselves half a second later."""
@@ -434,8 +432,8 @@ async def _say(last_word: Work) -> None:
 async def remember(history: Queries, parts: Pipeline) -> None:
     """Take up open rows of earlier runs, while STOP already works.
 
-    A P1 that nobody acknowledged stays active, the log continues, and rows that a crash
-    left open are closed.  Nothing waits for this: until the history answers the page
+    A P1 that nobody acknowledged stays active, and rows that a crash left open are
+    closed.  Nothing waits for this: until the history answers the page
     says that earlier alerts are unknown.  Returns when all of it is taken up.
     """
     while True:
@@ -444,7 +442,6 @@ async def remember(history: Queries, parts: Pipeline) -> None:
             decisions = await history.open_decisions()
             alerted = await history.open_alerts()
             unseen = await history.unseen_alerts(MOST_KEPT)
-            lines = await history.newest_lines(EARLIER_LINES)
         except HopError:
             await asyncio.sleep(_ASK_AGAIN_S)
             continue
@@ -453,6 +450,5 @@ async def remember(history: Queries, parts: Pipeline) -> None:
         parts.goals.close_earlier(left_open, now)
         parts.evaluator.close_earlier(decisions, alerted, now)
         parts.evaluator.alerts.remember(read_alert(row, now) for row in unseen)
-        parts.core.event_log.recall(lines)
         parts.core.health_monitor.earlier_read = True
         return

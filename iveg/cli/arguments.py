@@ -74,7 +74,6 @@ def add_db(database: argparse.ArgumentParser) -> None:
     """Arguments of ``iveg db``."""
     actions = database.add_subparsers(dest="action", required=True)
     actions.add_parser("upgrade", help="to the newest schema")
-    actions.add_parser("stats", help="rows, bytes and ages of each table")
 
 
 def add_export(export: argparse.ArgumentParser) -> None:

@@ -43,8 +43,6 @@ Data = Literal["odometry", "detections", "lidar"]
 """The paper's three rows; its "YOLOx" is ``detections``."""
 DATA: Final[tuple[Data, ...]] = get_args(Data)
 
-Window = Literal["1min", "15min", "24h"]
-
 _DATA: Final[dict[type, Data]] = {
     Odometry: "odometry",
     DetectionFrame: "detections",
@@ -127,19 +125,14 @@ def merged(sketches: Iterable[Sketch]) -> Sketch:
     return whole
 
 
-SLICE_S: Final = 10.0
-_WINDOWS: Final[dict[Window, tuple[int, int]]] = {
-    "1min": (1, 6),
-    "15min": (6, 15),
-    "24h": (360, 24),
-}
-"""Slices in one sketch of a window, and number of its whole sketches."""
+SLICE_S: Final = 60.0
+_SLICES: Final = 15
 
 
 class Series:
     """Durations of one hop, for one kind of data of one robot.
 
-    Ten seconds fill one sketch; then they join the newest of each window's ring.
+    A minute fills one sketch; fifteen whole ones and the newest are kept.
 
     Attributes:
         count: Number of durations since the start; ``total`` their sum (s).
@@ -147,33 +140,22 @@ class Series:
 
     def __init__(self) -> None:
         self.count, self.total = 0, 0.0
-        self._ended = 0
-        self._filling = Sketch()
-        self._rings = {
-            window: deque([Sketch()], maxlen=kept + 1)
-            for window, (_, kept) in _WINDOWS.items()
-        }
+        self._slices = deque([Sketch()], maxlen=_SLICES + 1)
 
     def add(self, duration_s: float) -> None:
         """One more message passed."""
         self.count += 1
         self.total += duration_s
-        self._filling.add(duration_s)
+        self._slices[-1].add(duration_s)
 
     def end_slice(self) -> None:
-        """Ten seconds are over."""
-        self._ended += 1
-        for window, (slices, _) in _WINDOWS.items():
-            ring = self._rings[window]
-            ring[-1].include(self._filling)
-            if self._ended % slices == 0:
-                ring.append(Sketch())
-        self._filling = Sketch()
+        """A minute is over."""
+        self._slices.append(Sketch())
 
-    def parts(self, window: Window) -> list[Sketch]:
-        """Sketches that together are this window; none of them changes any more."""
-        *whole, newest = self._rings[window]
-        return [*whole, merged([newest, self._filling])]
+    def parts(self) -> list[Sketch]:
+        """Sketches of the last 15 minutes; none of them changes any more."""
+        *whole, newest = self._slices
+        return [*whole, merged([newest])]
 
 
 # --- messages at their hops -----------------------------------------------------------
@@ -323,7 +305,7 @@ class LatencyWatch:
             stream.segments["screen"].add(took)
 
     def tick(self, now: Instant) -> None:
-        """Let time pass: slices for the windows."""
+        """Let time pass, slice by slice."""
         if self._slice_at is None:
             self._slice_at = now.mono
         if now.mono - self._slice_at < SLICE_S:
@@ -346,16 +328,16 @@ Cell = tuple[Data, Segment]
 
 
 def collect(
-    streams: Iterable[Stream], window: Window, robot_id: str | None = None
+    streams: Iterable[Stream], robot_id: str | None = None
 ) -> dict[Cell, list[Sketch]]:
-    """The finished sketches of a window, of one robot or of all; for the loop."""
+    """The sketches of one robot or of all; for the loop."""
     found: dict[Cell, list[Sketch]] = {
         (data, hop): [] for data in DATA for hop in SEGMENTS
     }
     for stream in streams:
         if robot_id in (None, stream.robot_id):
             for hop, series in stream.segments.items():
-                found[stream.data, hop] += series.parts(window)
+                found[stream.data, hop] += series.parts()
     return found
 
 

@@ -13,7 +13,7 @@ it is at least what is shown.  Left out: the intrusion distance C, since nobody 
 through a light curtain here.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -67,7 +67,7 @@ class SafetyMargin:
 
 
 class LeastMargins:
-    """The margin to show first of each robot and each person, all pairs at once.
+    """The margin to show first of each robot, all pairs at once.
 
     Negative ones come first, then unknown ones, then the least.  Only sightings that
     still protect a person count.
@@ -121,26 +121,16 @@ class LeastMargins:
         self._terms = gap, needs, age
 
     def of_robot(self, robot_id: str) -> SafetyMargin | None:
-        """The least margin of this robot to anybody."""
-        rows = [n for n, one in enumerate(self._robots) if one.robot_id == robot_id]
-        return self._least(rows, range(len(self._persons)))
-
-    def of_person(self, person_id: str) -> SafetyMargin | None:
-        """The least margin of any robot to this person."""
-        columns = [n for n, one in enumerate(self._persons) if one == person_id]
-        return self._least(range(len(self._robots)), columns)
-
-    def _least(
-        self, rows: Sequence[int], columns: Sequence[int]
-    ) -> SafetyMargin | None:
-        """The first by rank of these pairs; None where there are none."""
-        if not rows or not columns:
+        """The least margin of this robot to anybody; None where there is no pair."""
+        row = next(
+            (n for n, one in enumerate(self._robots) if one.robot_id == robot_id), None
+        )
+        if row is None or not self._persons:
             return None
-        place = int(self._rank[np.ix_(rows, columns)].argmin())
-        row, column = rows[place // len(columns)], columns[place % len(columns)]
+        column = int(self._rank[row].argmin())
         gap, needs, age = (term.item(row, column) for term in self._terms)
         return SafetyMargin(
-            self._robots[row].robot_id,
+            robot_id,
             self._persons[column],
             gap,
             needs,

@@ -6,7 +6,7 @@ says how long it takes at least now, so that a path that stops is not taken for 
 one::
 
     sent    1    2    3    4    5
-    back    +1.0 +1.5                →  now, 4 s after 3 left: 4.0 s behind, growing
+    back    +1.0 +1.5                →  now, 4 s after 3 left: 4.0 s behind
 
 A probe that a later one has overtaken no longer counts: it may be lost for ever.
 
@@ -44,7 +44,6 @@ class Hop(StrEnum):
 
 _KEPT = 600
 """Probes remembered: twenty minutes of them, at one in two seconds."""
-_GROWS_S, _GROWS_WITHIN_S = 0.5, 10.0
 SLOW_S = 1.0
 """A probe, a measure or an answer that takes longer is late (s)."""
 
@@ -59,9 +58,7 @@ class ProbeLag:
     _sent: dict[Origin, float] = field(default_factory=dict)
     _out: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT))
     _newest: float = float("-inf")
-    _back: deque[tuple[float, float]] = field(
-        default_factory=lambda: deque(maxlen=_KEPT)
-    )
+    _transit_s: float | None = None
 
     def sent(self, origin: Origin, now: Instant) -> None:
         """A probe leaves."""
@@ -78,9 +75,7 @@ class ProbeLag:
         self._newest = left
         while self._out and self._out[0] <= left:
             self._out.popleft()
-        self._back.append((now.mono, now.mono - left))
-        while len(self._back) > 2 and self._back[1][0] <= now.mono - _GROWS_WITHIN_S:
-            self._back.popleft()
+        self._transit_s = now.mono - left
 
     def sent_at(self, origin: Origin) -> float | None:
         """When this probe left (monotonic, s); None for one that is not ours."""
@@ -89,7 +84,7 @@ class ProbeLag:
     @property
     def is_known(self) -> bool:
         """Whether a probe has come back; until then ``lag`` only says "at least"."""
-        return bool(self._back)
+        return self._transit_s is not None
 
     def has_passed(self, sent_at: float) -> bool:
         """Whether a probe that left then (monotonic, s), or a later one, came back."""
@@ -98,35 +93,20 @@ class ProbeLag:
     @property
     def transit_s(self) -> float:
         """Transit time of the newest returned probe (s); 0 before the first."""
-        return self._back[-1][1] if self._back else 0.0
+        return self._transit_s or 0.0
 
     def lag(self, now: Instant) -> float | None:
         """Lag of the data path (s); None before the first probe left."""
-        known = [self._back[-1][1]] if self._back else []
+        known = [] if self._transit_s is None else [self._transit_s]
         if self._out:
             known.append(max(0.0, now.mono - self._out[0]))
         return max(known, default=None)
 
-    def grows(self, now: Instant) -> bool:
-        """Whether the lag is larger than it was ten seconds ago, or at first."""
-        lag = self.lag(now)
-        if lag is None:
-            return False
-        return lag > self._earlier(now) + _GROWS_S
 
-    def _earlier(self, now: Instant) -> float:
-        """The lag ten seconds ago, as far as it is known (s)."""
-        before = now.mono - _GROWS_WITHIN_S
-        past = [transit for at, transit in self._back if at <= before]
-        if past:
-            return past[-1]
-        return self._back[0][1] if self._back else 0.0
-
-
-def lag_in_words(lag_s: float, *, growing: bool = False) -> str:
+def lag_in_words(lag_s: float) -> str:
     """A lag as the log, programs and ``iveg doctor`` say it."""
     late = f"{lag_s:.0f}" if lag_s >= 10.0 else f"{lag_s:.1f}"
-    return f"measures reach Orion {late} s late" + (", growing" if growing else "")
+    return f"measures reach Orion {late} s late"
 
 
 def stopped_in_words(lag_s: float | None) -> str:

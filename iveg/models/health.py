@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field
 
-from iveg.domain.latency import Data, Window
+from iveg.domain.latency import Data
 from iveg.domain.recordings import RecordingFile
 from iveg.models.base import Hundredth, Model, Stamp, Tenth
 
@@ -18,13 +18,11 @@ class HopHealth(Model):
     """One hop of the data path from robot to screen.
 
     Attributes:
-        hop: ``mqtt``, ``orion``, ``iot_agent``, ``notifications``, ``database`` or
-            ``emulator``.
+        hop: ``mqtt``, ``orion``, ``iot_agent``, ``notifications`` or ``database``.
         state: How it is.
         age_s: Of the evidence (s).
         key: Its sentence.
         detail: What else is known.
-        growing: The lag grows.
     """
 
     hop: str
@@ -33,7 +31,6 @@ class HopHealth(Model):
     key: str
     detail: str
     lag_s: Tenth | None = Field(description="How late measures pass it, at least.")
-    growing: bool
 
 
 class Health(Model):
@@ -100,17 +97,15 @@ class LatencyClock(Model):
 
 
 class LatencyTable(Model):
-    """Every hop of every kind of data over one window.
+    """Every hop of every kind of data over the last 15 minutes.
 
     Attributes:
         at: When.
-        window: The window.
         rows: One for each kind of data.
         clocks: One for each robot.
     """
 
     at: str
-    window: Window
     robot: str | None = Field(description="Null: all robots.")
     direct: bool = Field(
         description=(

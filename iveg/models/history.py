@@ -1,7 +1,7 @@
 """The past: rows of the history as REST, NDJSON and pages have them, and one day."""
 
 import json
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field, JsonValue
 
@@ -19,7 +19,6 @@ from iveg.models.base import (
     GreenhouseMap,
     Hundredth,
     Model,
-    Position,
     Row,
     Slots,
     Stamp,
@@ -143,22 +142,6 @@ class Measurement(Row):
 # --- decisions ------------------------------------------------------------------------
 
 
-class DecisionRule(Model):
-    """The rule that fired, as it was at that moment.
-
-    Attributes:
-        id: The rule.
-        version: The rule.
-        parameters: Its values; ``obstacle``, of older decisions for which only a laser
-            saw why: ``size_m``, ``gap_m`` (from the outline, m), ``moved``, ``over_s``
-            (for how long it was seen), else null.
-    """
-
-    id: str | None
-    version: str | None
-    parameters: JsonValue
-
-
 class DecisionLink(Model):
     """One link of the chain of evidence.
 
@@ -181,63 +164,26 @@ class DecisionLink(Model):
     verdict: str = ""
 
 
-class DecisionPlace(Model):
-    """Pose of a robot when a decision began, in ``map`` (m, rad).
-
-    Attributes:
-        robot_id: The robot.
-        x: In ``map`` (m).
-        y: In ``map`` (m).
-        yaw: Heading (rad).
-    """
-
-    robot_id: str
-    x: float
-    y: float
-    yaw: float
-
-
 @row_of(DecisionRecord)
 class Decision(Row):
     """One decision: detection, observer, rule, and the robot's reaction.
 
     Why one robot was slowed: who was seen by whom, which rule fired, when the robot
-    obeyed. What stands in ``position`` and ``rule`` has a key of its own, too, named as
-    in the CSV.
+    obeyed. ``rule_parameters`` has the numbers of the rule, poses of the robot and its
+    observer (``places``) and, of older decisions of a laser alone, an ``obstacle``.
 
     Attributes:
-        position: In ``map``.
-        rule: The rule that fired.
         links: The chain of evidence.
         sentence: The sentence that the log used.
     """
 
-    position: Position | None
-    rule: DecisionRule
     links: list[DecisionLink]
     sentence: Sentence
-    places: list[DecisionPlace] = Field(
-        description=(
-            "Poses of the robot and its observer; empty for those of the earlier "
-            "version."
-        )
-    )
 
     @classmethod
     def from_record(cls, record: DecisionRecord) -> Self:
         """One decision, from memory or from the history."""
-        parameters: dict[str, Any] = dict(record.rule_parameters)
-        places = parameters.pop("places", [])
-        rule = DecisionRule(
-            id=record.rule_id, version=record.rule_version, parameters=parameters
-        )
-        return cls.from_value(
-            record,
-            position=Position.of_record(record),
-            rule=rule,
-            sentence=sentence_of(record),
-            places=places,
-        )
+        return cls.from_value(record, sentence=sentence_of(record))
 
 
 def sentence_of(record: DecisionRecord) -> Sentence:

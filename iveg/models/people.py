@@ -20,7 +20,6 @@ from iveg.models.base import (
     Thousandth,
     row_of,
 )
-from iveg.models.robot import Margin
 
 
 class Acting(Model):
@@ -86,7 +85,6 @@ class Person(Model):
         observers: Robots that saw it.
         lane: Aisle in which it is.
         acting: Robots that are slowed for it.
-        margin: The least margin of any robot to it.
     """
 
     person_id: str
@@ -112,7 +110,6 @@ class Person(Model):
     )
     lane: str | None
     acting: list[Acting]
-    margin: Margin | None
     thing_id: str | None = Field(
         description="The mark by which it is no person and has no zone."
     )

@@ -98,7 +98,7 @@ class Margin(Model):
     """The gap to a person less what stopping takes; shown, never acted on.
 
     The gap to a person less what stopping takes (S_p of ISO 13855). It is the least of
-    a robot or person; it is shown and never acted on.
+    a robot; it is shown and never acted on.
 
     ``band`` is ``unknown`` when the pose is older than 1.5 s, or when the detection is
     and the person may be nearer than 1 m by now. Of a person who is farther away,

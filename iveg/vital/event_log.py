@@ -113,18 +113,6 @@ class EventLog:
         self.log(event(), at)
 
     @_guarded
-    def recall(self, earlier: Iterable[LogRecord]) -> None:
-        """Put lines of an earlier run before those of this one; any order."""
-        first = self.lines[0].id if self.lines else self._next_id + 1
-        before = sorted(
-            (one for one in earlier if one.id < first), key=lambda one: one.id
-        )
-        before = before[-(_KEPT_LINES - len(self.lines)) :]
-        if before and len(self.lines) < _KEPT_LINES:
-            self.lines.extendleft(reversed(before))
-            self.supervision.tell("appended", topics.EARLIER_LOG.name, before)
-
-    @_guarded
     def decisions(self, changed: Iterable[SlowdownDecision]) -> None:
         """Record decisions that are new or have a new link."""
         for decision in changed:

@@ -38,7 +38,6 @@ class HopHealth:
         age_s: How old the evidence is (s).
         detail: One short sentence.
         lag_s: How late measures pass it (s); None where no probe tells.
-        growing: Whether they pass it ever later.
     """
 
     name: Hop
@@ -46,7 +45,6 @@ class HopHealth:
     age_s: float | None = None
     detail: str = ""
     lag_s: float | None = None
-    growing: bool = False
 
 
 class HealthMonitor:
@@ -169,29 +167,27 @@ class HealthMonitor:
             return HopHealth(Hop.AGENT, "down", age, self.agent_error)
         if broken and state != "ok":
             return HopHealth(Hop.AGENT, "unknown", age)
-        lag, growing = self._lag(now)
+        lag = self._lag(now)
         if state == "ok" or (state == "late" and self._was_behind):
-            state, detail = self._agent_says(lag, growing=growing)
+            state, detail = self._agent_says(lag)
         else:
             detail = "" if state == "unknown" else stopped_in_words(lag)
-        return HopHealth(Hop.AGENT, state, age, detail, lag, growing)
+        return HopHealth(Hop.AGENT, state, age, detail, lag)
 
-    def _lag(self, now: Instant) -> tuple[float | None, bool]:
-        """Lag of the agent (s), and whether it grows.
+    def _lag(self, now: Instant) -> float | None:
+        """Lag of the agent (s).
 
         For a probe that Orion has and that did not come back, notifications are at
         fault, and the lag of the agent is unknown.
         """
         if self.stored_at is not None and not self.probe.has_passed(self.stored_at):
-            return None, False
-        return self.probe.lag(now), self.probe.grows(now)
+            return None
+        return self.probe.lag(now)
 
-    def _agent_says(
-        self, lag_s: float | None, *, growing: bool
-    ) -> tuple[HopState, str]:
+    def _agent_says(self, lag_s: float | None) -> tuple[HopState, str]:
         """State of an agent that measures pass, with the lag first."""
         if lag_s is not None and lag_s > SLOW_S:
-            return "late", lag_in_words(lag_s, growing=growing)
+            return "late", lag_in_words(lag_s)
         if self.agent_silent:
             return "down", self.agent_silent
         detail = self.agent_slow or self.agent_warning
@@ -212,10 +208,9 @@ class HealthMonitor:
         return min(_LONGEST_GAP_S, max(DOWN_S, 2 * self._gap_s))
 
     def is_overloaded(self, now: Instant) -> bool:
-        """Whether measures pass the agent ever later: nothing may be added to it."""
+        """Whether measures pass the agent late: nothing may be added to it."""
         _, state = self._passing(now)
-        passing = state in ("ok", "late")
-        return passing and self._was_behind and self.probe.grows(now)
+        return state in ("ok", "late") and self._was_behind
 
     def _passing(self, now: Instant) -> tuple[float | None, HopState]:
         """Age of the newest measure that passed the agent (s), and its verdict."""

@@ -106,9 +106,6 @@ LOG = Topic(
     member="log",
     read=lambda reader, _: reader.newest_log(),
 )
-EARLIER_LOG = Topic(
-    "log/earlier", list[LogEntry], tell=lambda reader, lines, _: reader.log(lines)
-)
 HEALTH = Topic(
     "health",
     Health,
@@ -142,7 +139,6 @@ TOPICS = (
     RULE,
     MAP,
     LOG,
-    EARLIER_LOG,
     HEALTH,
     CLIMATE,
     EQUIPMENT,

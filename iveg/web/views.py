@@ -186,16 +186,13 @@ class Views:
 
     # --- people and looks ---------------------------------------------------------
 
-    def people(
-        self, now: Instant, margins: LeastMargins | None = None
-    ) -> list[PersonModel]:
+    def people(self, now: Instant) -> list[PersonModel]:
         """Every known person."""
-        margins = margins or self.margins(now)
         entries = defaultdict[str, list[ZoneEntry]](list)
         for one in self._evaluator.entries:
             entries[one.zone.cause].append(one)
         return [
-            self._person(person, entries[person.person_id], margins, now)
+            self._person(person, entries[person.person_id], now)
             for person in self._people.known.values()
         ]
 
@@ -203,7 +200,6 @@ class Views:
         self,
         person: TrackedPerson,
         entries: Iterable[ZoneEntry],
-        margins: LeastMargins,
         now: Instant,
     ) -> PersonModel:
         newest, rule = person.newest, self._evaluator.rule
@@ -228,7 +224,6 @@ class Views:
             decision_id=max((one.decision_id for one in entries), default=None),
             lane=self._greenhouse.lane_at(x, y),
             acting=[Acting.from_value(one) for one in entries],
-            margin=Margin.of(margins.of_person(person.person_id)),
             thing_id=None if thing is None else thing.thing_id,
         )
 

@@ -66,7 +66,7 @@ _ROUTES = (
     "commands/C1",
     "alerts",
     "log",
-    "latency?window=1min&figures=false",
+    "latency?figures=false",
 )
 _FILES = ("decisions", "detections", "commands", "alerts", "log")
 

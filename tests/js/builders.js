@@ -117,7 +117,6 @@ export function person(changes = {}) {
     decision_id: "d1",
     lane: null,
     acting: [],
-    margin: null,
     possible: false,
     evidence: null,
     thing_id: null,

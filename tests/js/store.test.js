@@ -111,16 +111,3 @@ test("a command that follows a snapshot is told after it, and after the snapshot
 
   equal(heard, ["snapshot", "SENT", "DELIVERED"]);
 });
-
-test("13.6: lines of before the server's restart come before those that are known", () => {
-  const { store, frame, heard, hear } = storeByHand();
-  store.apply("snapshot", snapshot({ log: [entry(7)] }), 0);
-  hear("log/earlier");
-  store.apply("log/earlier", [entry(5), entry(6), entry(7)], 1);
-  frame();
-  equal(
-    store.log().map(({ id }) => id),
-    [5, 6, 7],
-  );
-  equal(heard, ["log/earlier"]);
-});

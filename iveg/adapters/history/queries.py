@@ -41,7 +41,6 @@ from iveg.domain.records import (
     CommandEventRecord,
     CommandRecord,
     DecisionRecord,
-    LogRecord,
 )
 
 P = ParamSpec("P")
@@ -164,10 +163,6 @@ class Queries:
         for step in await self.ask(_records, CommandEventRecord, wanted):
             steps.setdefault(step.command_id, []).append(step)
         return steps
-
-    async def newest_lines(self, most: int) -> tuple[LogRecord, ...]:
-        """The newest lines of the log, newest first."""
-        return (await self.page(lists.LOG, Filter(limit=most))).items
 
     def close(self) -> None:
         """Let go of threads and connections."""

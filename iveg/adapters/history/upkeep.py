@@ -8,7 +8,6 @@ import asyncio
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -290,33 +289,3 @@ class HistoryUpkeep:
             rows += took
             await asyncio.sleep(PAUSE_S)
         return rows
-
-
-# --- size ----
-
-
-@dataclass(frozen=True, slots=True)
-class TableStats:
-    """Rows of one table.
-
-    Attributes:
-        oldest: (Unix s); None of an empty table, as ``newest``.
-    """
-
-    name: str
-    rows: int
-    oldest: float | None
-    newest: float | None
-
-
-def read_stats(connection: Connection) -> tuple[list[TableStats], int]:
-    """Rows of each table, and the size of all (bytes); reads all of it."""
-    found: list[TableStats] = []
-    for name, at in AGES.items():
-        measured = select(func.count(), func.min(at), func.max(at))
-        found.append(TableStats(name, *connection.execute(measured).one()))
-    if connection.dialect.name == "postgresql":
-        size = "SELECT pg_database_size(current_database())"
-    else:
-        size = "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size"
-    return found, int(connection.scalar(text(size)) or 0)

@@ -225,12 +225,8 @@ export type Coverage = {
 
 /** One decision: detection, observer, rule, and the robot's reaction. */
 export type Decision = {
-  position: Position | null;
-  rule: DecisionRule;
   links: DecisionLink[];
   sentence: Sentence;
-  /** Poses of the robot and its observer; empty for those of the earlier version. */
-  places: DecisionPlace[];
   /** The decision (ULID). */
   decision_id: string;
   /** `alert` (somebody was confirmed) or `mandate` (a speed limit). */
@@ -289,21 +285,6 @@ export type DecisionLink = {
   at: string | null;
   value: JsonValue;
   verdict: string;
-};
-
-/** Pose of a robot when a decision began, in ``map`` (m, rad). */
-export type DecisionPlace = {
-  robot_id: string;
-  x: number;
-  y: number;
-  yaw: number;
-};
-
-/** The rule that fired, as it was at that moment. */
-export type DecisionRule = {
-  id: string | null;
-  version: string | null;
-  parameters: JsonValue;
 };
 
 /** One box of one detection frame, placed in ``map``. */
@@ -460,7 +441,6 @@ export type HopHealth = {
   detail: string;
   /** How late measures pass it, at least. */
   lag_s: number | null;
-  growing: boolean;
 };
 
 /** An account with the link that begins it, which is shown this once. */
@@ -508,10 +488,9 @@ export type LatencyRow = {
   hops: Record<string, SegmentSpread>;
 };
 
-/** Every hop of every kind of data over one window. */
+/** Every hop of every kind of data over the last 15 minutes. */
 export type LatencyTable = {
   at: string;
-  window: "1min" | "15min" | "24h";
   /** Null: all robots. */
   robot: string | null;
   /** Whether iVeg reads the broker itself, so that Δt₁ and Δt₂ are two numbers. */
@@ -661,7 +640,6 @@ export type Person = {
   decision_id: string | null;
   lane: string | null;
   acting: Acting[];
-  margin: Margin | null;
   /** The mark by which it is no person and has no zone. */
   thing_id: string | null;
 };

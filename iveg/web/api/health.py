@@ -83,13 +83,6 @@ def _families(health: Health, watch: LatencyWatch, queues: Queues) -> list[Metri
             ),
             (
                 "gauge",
-                "lag_growing",
-                "1 while that lag grows, else 0.",
-                "hop",
-                {hop.hop: hop.growing for hop in hops if hop.lag_s is not None},
-            ),
-            (
-                "gauge",
                 "clock_offset_seconds",
                 "Clock of the robot minus clock of the server.",
                 "robot",
@@ -111,7 +104,7 @@ def _families(health: Health, watch: LatencyWatch, queues: Queues) -> list[Metri
 def _summary(latency: _Latency) -> Metric:
     """Quantiles, sum and count of each hop."""
     name = "iveg_latency_seconds"
-    text = "Latency of a hop; quantiles are of the last minute."
+    text = "Latency of a hop; quantiles are of the last 15 minutes."
     made = Metric(name, text, "summary")
     for (robot, data, hop), count, total, sketches in latency:
         labels, sketch = {"robot": robot, "data": data, "hop": hop}, merged(sketches)
@@ -167,7 +160,7 @@ def router(
                 (stream.robot_id, stream.data, hop),
                 part.count,
                 part.total,
-                part.parts("1min"),
+                part.parts(),
             )
             for stream in watch.streams
             for hop, part in stream.segments.items()

@@ -6,7 +6,6 @@ Lists answer JSON, CSV or NDJSON, as ``Accept`` or ``format`` says.
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Annotated, Any, Generic, TypeVar
 
 from fastapi import APIRouter, Depends, HTTPException, Path, Query, Request, Response
@@ -36,7 +35,6 @@ from iveg.web.api import day, exports
 from iveg.web.api.answers import Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
 from iveg.web.api.history_filters import Filters, filter_of
-from iveg.web.pages.sentences import Sentences, read_sentences
 from iveg.web.security.requirements import require
 from iveg.web.security.roles import Action
 
@@ -220,7 +218,7 @@ def _add_list(
         if filters.limit is not None:
             page = replace(page, next=None)
         pages = queries.pages(one.source, page, wanted)
-        body = file_parts(one, pages, form, worker.run, filters.language)
+        body = file_parts(one, pages, form, worker.run)
         attached = f'attachment; filename="{one.path}.{form}"'
         return StreamingResponse(
             body, 200, {"Content-Disposition": attached}, MEDIA_TYPES[form]
@@ -252,28 +250,19 @@ async def file_parts(
     pages: AsyncIterator[Sequence[R]],
     form: Form,
     run: Callable[..., Awaitable[bytes]],
-    language: str | None = None,
 ) -> AsyncIterator[bytes]:
     """A list as a file, a part for each page; ``run`` has a part written elsewhere."""
     has_head = form == "csv"
     async for records in pages:
         if form == "csv":
             kind = one.source.kind
-            yield await run(_csv_page, kind, records, language, has_head=has_head)
+            yield await run(_csv_page, kind, records, has_head=has_head)
             has_head = False
         else:
             rows = await one.rows(records)
             yield await run(exports.ndjson_rows, one.shape.from_record, rows)
 
 
-def _csv_page(
-    kind: type[R], records: Sequence[R], language: str | None, *, has_head: bool
-) -> bytes:
-    reader = _reader(language)
-    head = exports.csv_head(kind, reader) if has_head else b""
-    return head + exports.csv_rows(kind, records, reader)
-
-
-@cache
-def _reader(language: str | None) -> Sentences | None:
-    return None if language is None else read_sentences(language)
+def _csv_page(kind: type[R], records: Sequence[R], *, has_head: bool) -> bytes:
+    head = exports.csv_head(kind) if has_head else b""
+    return head + exports.csv_rows(kind, records)

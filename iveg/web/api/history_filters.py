@@ -6,7 +6,7 @@ refused: a misspelt filter that answers everything would mislead.
 
 from collections.abc import Callable
 from datetime import UTC, date, datetime
-from typing import Annotated, Literal, Self, TypeVar
+from typing import Annotated, Self, TypeVar
 
 from fastapi.exceptions import RequestValidationError
 from pydantic import (
@@ -112,10 +112,6 @@ class Filters(RowFilters):
 
     cursor: str | None = Field(
         None, max_length=200, description="`next` of the page before"
-    )
-    language: Literal["es", "en"] | None = Field(
-        None,
-        description="CSV as that reader's spreadsheet expects it, with sentences",
     )
 
 

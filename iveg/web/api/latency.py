@@ -18,7 +18,6 @@ from iveg.domain.latency import (
     SEGMENTS,
     LatencyWatch,
     Sketch,
-    Window,
     collect,
     merge,
 )
@@ -37,11 +36,10 @@ from iveg.web.security.requirements import READERS
 
 
 class Asked(BaseModel):
-    """Window and robot of the question."""
+    """Robot of the question."""
 
     model_config = ConfigDict(extra="forbid")
 
-    window: Window = Field("15min", description="1min, 15min or 24h")
     robot: str | None = Field(
         None, pattern=r"^[A-Za-z0-9-]{1,64}$", description="Robot id; all unless told"
     )
@@ -79,8 +77,8 @@ def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
     async def latency(asked: Annotated[Asked, Query()]) -> Response:
         """Mean and quantiles of each hop, clocks, and the figure."""
         now = clock()
-        parts = collect(watch.streams, asked.window, asked.robot)
-        # A day of ten robots is merged in a thread, as sending all of it to the worker
+        parts = collect(watch.streams, asked.robot)
+        # What ten robots sent is merged in a thread, as sending all of it to the worker
         # costs more; the figure of the sums is drawn there.
         sketches = await asyncio.to_thread(merge, parts)
         figures: dict[str, object] = {}
@@ -88,7 +86,6 @@ def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
             figures["cdf"] = orjson.Fragment(await worker.run(cdf_figure, sketches))
         answer = LatencyTable(
             at=format_stamp(now.wall),
-            window=asked.window,
             robot=asked.robot,
             direct=any(sketches[data, "uplink"].count for data in DATA),
             rows=[

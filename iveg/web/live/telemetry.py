@@ -117,7 +117,7 @@ class TelemetryEncoder:
         version = self._hub.versions[topics.PEOPLE.name]
         is_young = now.mono - self._people.at < young_s
         if self._people.version != version and not is_young:
-            people = self._views.people(now, self._margins_at(now))
+            people = self._views.people(now)
             self._people.update(people, version, now.mono)
         return self._people.changes(since)
 
@@ -257,11 +257,7 @@ class _People:
 
 
 def _without_ages(person: Person) -> dict[str, object]:
-    members, margin = dict(person.__dict__), person.margin
-    del members["age_s"]
-    if margin is not None:
-        members["margin"] = {**margin.__dict__, "age_s": None}
-    return members
+    return {name: value for name, value in vars(person).items() if name != "age_s"}
 
 
 def write_frame(head: bytes, bodies: Iterable[bytes]) -> bytes:

@@ -1,4 +1,4 @@
-"""A restart forgets neither a P1 that nobody saw nor the log."""
+"""A restart forgets no P1 that nobody saw."""
 
 import asyncio
 from typing import cast
@@ -7,9 +7,9 @@ from iveg.adapters.history.queries import Queries
 from iveg.app.dss import remember
 from iveg.domain.alerts import read_alert
 from iveg.domain.errors import HopError
-from iveg.domain.records import AlertRecord, LogRecord
+from iveg.domain.records import AlertRecord
 from tests.builders import at
-from tests.fakes.records import alert_record, log_record
+from tests.fakes.records import alert_record
 from tests.unit.vital.desk import Desk
 
 
@@ -19,10 +19,9 @@ class LeftBehind:
     def __init__(
         self,
         alerts: tuple[AlertRecord, ...] = (),
-        lines: tuple[LogRecord, ...] = (),
         silent_times: int = 0,
     ) -> None:
-        self._alerts, self._lines = alerts, lines
+        self._alerts = alerts
         self._silent_times = silent_times
 
     async def open_commands(self) -> tuple[()]:
@@ -39,9 +38,6 @@ class LeftBehind:
 
     async def unseen_alerts(self, most: int) -> tuple[AlertRecord, ...]:
         return self._alerts[:most]
-
-    async def newest_lines(self, most: int) -> tuple[LogRecord, ...]:
-        return self._lines[:most]
 
 
 async def take_up(desk: Desk, left: LeftBehind) -> None:
@@ -69,17 +65,6 @@ async def test_unacknowledged_p1s_come_back_and_can_be_acknowledged() -> None:
     assert [one.alert_id for one in desk.evaluator.alerts.waiting] == ["A2"]
     again = read_alert(desk.records(AlertRecord)[-1], at(5))
     assert (again.last.acknowledged_by, again.last.note) == ("ana", "seen")
-
-
-async def test_the_log_goes_on_where_it_broke_off_for_open_pages_too() -> None:
-    desk = Desk()
-    page = desk.hub.join()
-    lines = [log_record(id=number, at=at(-number).wall) for number in (3, 2, 1)]
-
-    await take_up(desk, LeftBehind(lines=tuple(lines)))
-
-    assert [one.id for one in desk.event_log.lines] == [1, 2, 3]
-    assert [topic for topic, _ in page.drain_events()] == ["log/earlier"]
 
 
 def test_without_the_history_earlier_alerts_are_unknown_after_two_seconds() -> None:

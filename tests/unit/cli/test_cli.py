@@ -106,7 +106,7 @@ def test_provisioning_a_fiware_that_is_away_says_so(
 def test_a_database_that_is_not_there_is_one_sentence(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    assert run(["db", "stats"]) == 1
+    assert run(["export", "decisions"]) == 1
     said = f"there is none at {tmp_path / 'iveg' / 'iveg.sqlite'}; `iveg db upgrade`"
     assert said in capsys.readouterr().err
 

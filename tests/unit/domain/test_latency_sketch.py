@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from iveg.domain.latency import SLICE_S, Series, Sketch, Window, merged
+from iveg.domain.latency import Series, Sketch, merged
 from tests.data import latencies
 
 SHARES = (0.5, 0.9, 0.95, 0.99)
-SLICES_A_MINUTE = round(60 / SLICE_S)
-WINDOWS: tuple[Window, ...] = "1min", "15min", "24h"
 
 
 def sketch_of(values: NDArray[np.float64]) -> Sketch:
@@ -33,21 +31,14 @@ def test_quantiles_of_recorded_samples_are_within_one_percent(hop: str) -> None:
         assert sketch.quantile(share) == pytest.approx(exact(values, share), rel=0.01)
 
 
-def filled(minutes: int, each: float) -> Series:
-    """A series of one sample a slice; of minute m they are m + 1 times ``each``."""
+def test_a_series_holds_fifteen_minutes_and_the_one_that_goes_on() -> None:
     series = Series()
-    for slice_ in range(minutes * SLICES_A_MINUTE):
-        series.add(each * (slice_ // SLICES_A_MINUTE + 1))
+    for minute in range(60):
+        series.add(0.001 * minute)
         series.end_slice()
-    return series
+    series.add(0.060)
 
+    kept = merged(series.parts())
 
-def test_a_window_holds_its_own_time_and_no_more() -> None:
-    series = filled(minutes=25 * 60, each=0.001)
-
-    minute, quarter, day = (merged(series.parts(one)) for one in WINDOWS)
-
-    assert (minute.count, quarter.count, day.count) == (6, 90, 24 * 360)
-    assert minute.mean == pytest.approx(1.500)
-    # The first hour is forgotten.
-    assert day.quantile(0.0) == pytest.approx(0.061, rel=0.01)
+    assert (series.count, kept.count) == (61, 16)
+    assert kept.quantile(0.0) == pytest.approx(0.045, rel=0.01)

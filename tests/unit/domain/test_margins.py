@@ -95,6 +95,3 @@ def test_all_pairs_at_once_are_the_pairs_one_by_one() -> None:
         for robot_id in scene.robots:
             mine = [one for one in ranked if one.robot_id == robot_id]
             assert margins(scene).of_robot(robot_id) == mine[0]
-        for somebody in scene.everyone:
-            its = [one for one in ranked if one.person_id == somebody.person_id]
-            assert margins(scene).of_person(somebody.person_id) == its[0]

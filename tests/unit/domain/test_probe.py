@@ -23,7 +23,6 @@ def test_before_the_first_came_back_the_lag_is_a_lower_bound_at_most() -> None:
     none, one = ProbeLag(), sent(0.0)
 
     assert (none.lag(at(5.0)), none.is_known) == (None, False)
-    assert not none.grows(at(5.0))
     assert (one.lag(at(3.0)), one.is_known) == (3.0, False)
 
 
@@ -53,30 +52,3 @@ def test_a_copy_a_straggler_or_a_probe_of_an_earlier_life_says_nothing(
     lag.returned(later, at(40.0))
 
     assert lag.lag(at(40.0)) == 0.5
-
-
-@pytest.mark.parametrize(
-    ("transits", "grows"),
-    [
-        ([0.3 * n for n in range(12)], True),
-        ([12.0] * 12, False),
-        ([12.0 - n for n in range(12)], False),
-    ],
-    ids=["longer", "as it is", "drains"],
-)
-def test_a_backlog_grows_while_probes_take_longer(
-    transits: list[float], *, grows: bool
-) -> None:
-    lag = sent(*(2.0 * n for n in range(12)))
-    for seq, transit in enumerate(transits):
-        lag.returned(probe(seq + 1), at(2.0 * seq + transit))
-
-    assert lag.grows(at(22.0 + transits[-1])) is grows
-
-
-def test_a_chain_that_stops_grows() -> None:
-    lag = sent(0.0, 2.0)
-    lag.returned(probe(1), at(0.1))
-
-    assert not lag.grows(at(2.2))
-    assert lag.grows(at(5.0))

@@ -12,7 +12,6 @@ from iveg.domain.records import (
     DetectionRecord,
     OdometryRecord,
 )
-from iveg.models.history import Decision
 from tests.builders import detection, detection_frame
 from tests.fakes.records import alert_record
 from tests.unit.vital.desk import Desk, conditions_of
@@ -39,10 +38,8 @@ def test_13_13_a_decision_remembers_where_the_robots_were() -> None:
 
     meet(desk)
 
-    view = Decision.from_record(desk.records(DecisionRecord)[-1])
-    assert {one.robot_id for one in view.places} == {"AGI", "AGII"}
-    assert isinstance(view.rule.parameters, dict)
-    assert "places" not in view.rule.parameters
+    places = desk.records(DecisionRecord)[-1].rule_parameters["places"]
+    assert {one["robot_id"] for one in places} == {"AGI", "AGII"}
 
 
 def test_feedback_tells_how_people_go_on_for_as_long_as_they_are_seen() -> None:

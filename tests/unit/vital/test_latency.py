@@ -11,7 +11,7 @@ from tests.unit.vital.desk import Desk
 
 def took(desk: Desk, hop: Segment) -> Sketch:
     stream = desk.latency.streams[0]
-    return merged(stream.segments[hop].parts("1min"))
+    return merged(stream.segments[hop].parts())
 
 
 def test_a_copy_that_comes_twice_counts_once_and_an_answer_not_at_all() -> None:

@@ -62,7 +62,7 @@ class Air(Stage):
         """What a hop took for a robot's odometry in the last minute."""
         streams = self.desk.latency.streams
         one = next(s for s in streams if (s.robot_id, s.data) == (robot_id, "odometry"))
-        return merged(one.segments[hop].parts("1min"))
+        return merged(one.segments[hop].parts())
 
 
 async def play(air: Air, seconds: float) -> None:

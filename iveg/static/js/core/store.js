@@ -185,7 +185,6 @@ export class Store {
     const { values, scans, detections } = this.#known;
     const [head, id, leaf] = topic.split("/");
     if (topic === "log") return this.#keepEntry(data);
-    if (topic === "log/earlier") return this.#keepEarlier(data);
     if (head === "robots" && !leaf) return this.#keepRobot(data);
     if (head === "robots") scans.set(id, data);
     else if (head === "detections") detections.set(id, data);
@@ -253,15 +252,6 @@ export class Store {
     log.push(entry);
     if (log.length > LOG_SIZE) log.splice(0, log.length - LOG_SIZE);
     return true;
-  }
-
-  /** Entries of before the server's restart. @param {Entry[]} entries oldest first */
-  #keepEarlier(entries) {
-    const { log } = this.#known;
-    const first = log.length ? log[0].id : Infinity;
-    const before = entries.filter(({ id }) => id < first);
-    this.#known.log = [...before, ...log].slice(-LOG_SIZE);
-    return before.length > 0;
   }
 
   /** Makes room: months of commands cost no more than the last ones.

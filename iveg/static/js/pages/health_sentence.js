@@ -5,7 +5,7 @@
  * the one nearest to the robots is named.
  *
  * @typedef {"ok" | "late" | "down" | "unknown"} State
- * @typedef {{hop: string, state: State, lag_s?: number | null, growing?: boolean}} Hop
+ * @typedef {{hop: string, state: State, lag_s?: number | null}} Hop
  * @typedef {{key: string, slots: Record<string, string | number>}} Sentence
  * @typedef {Sentence & {state: State, hop: string | null}} Verdict
  * @typedef {{id: string, link: import("../core/clock.js").Link}} Heard
@@ -15,14 +15,7 @@
 import { isSilent, linkOfRobot } from "../core/clock.js";
 
 /** In the order of the data path; then the hops beside it. */
-export const ORDER = [
-  "mqtt",
-  "iot_agent",
-  "orion",
-  "notifications",
-  "database",
-  "emulator",
-];
+export const ORDER = ["mqtt", "iot_agent", "orion", "notifications", "database"];
 /** From this lag on (s), the lag itself is the fault. */
 const LATE_S = 1;
 /** @type {State[]} */
@@ -80,7 +73,7 @@ export function sentenceOf(hop) {
   const lag = hop.lag_s ?? null;
   if (hop.state !== "late" || lag === null || lag <= LATE_S)
     return { key: `health.hop.${hop.hop}.${hop.state}`, slots: {} };
-  return { key: `health.lag.${hop.growing ? "growing" : "steady"}`, slots: { lag } };
+  return { key: "health.lag", slots: { lag } };
 }
 
 /**

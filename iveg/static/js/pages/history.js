@@ -57,7 +57,7 @@ async function start() {
     asked = picker.read();
     if (asked === null) return fail("range");
     say();
-    linkExports(asked, i18n.language());
+    linkExports(asked);
     need("#history").toggleAttribute("data-busy", true);
     try {
       await show(asked, signal);
@@ -137,7 +137,7 @@ async function start() {
     if (button) decision.open(String(button.dataset.decision), button);
   });
   i18n.onChange(() => {
-    if (asked) linkExports(asked, i18n.language());
+    if (asked) linkExports(asked);
     say();
     draw();
   });
@@ -162,14 +162,12 @@ async function read(path, signal) {
   return answer.json();
 }
 
-/** @param {Asked} asked @param {string} language */
-function linkExports(asked, language) {
+/** @param {Asked} asked */
+function linkExports(asked) {
   const links = /** @type {HTMLAnchorElement[]} */ (all("a[data-export]"));
   for (const link of links) {
     const query = queryOf(asked);
     query.set("format", String(link.dataset.format));
-    // A spreadsheet has its reader's separator and decimals; programs read NDJSON.
-    if (link.dataset.format === "csv") query.set("language", language);
     const day = wallText(asked.since).slice(0, 10);
     link.download = `${link.dataset.export}-${day}.${link.dataset.format}`;
     link.href = `/api/v1/${link.dataset.export}?${query}`;

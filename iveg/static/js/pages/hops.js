@@ -28,7 +28,7 @@ const PRINTED = /** @type {Record<string, string>} */ ({
 
 /** @param {import("../core/page.js").Page} page */
 export function start({ i18n }) {
-  let asked = { window: "15min", robot: "" };
+  let robot = "";
   /** @type {Latency | null} */
   let told = null;
   let status = 200;
@@ -36,11 +36,11 @@ export function start({ i18n }) {
 
   async function load() {
     if (document.hidden) return;
-    const query = queryOf(asked);
+    const query = queryOf(robot);
     const draws = times % DRAW_EVERY === 0;
     times += 1;
     const answer = await readApi(`latency?${query}&figures=${draws}`);
-    if (query !== queryOf(asked)) return;
+    if (query !== queryOf(robot)) return;
     status = answer.status;
     if (status === 200) told = answer.body;
     await draw();
@@ -61,23 +61,17 @@ export function start({ i18n }) {
     load();
   }
 
-  /** @param {Partial<typeof asked>} change */
-  function ask(change) {
-    asked = { ...asked, ...change };
-    for (const chip of all("[data-window]")) {
-      setAttribute(chip, "aria-pressed", String(chip.dataset.window === asked.window));
-    }
+  /** @param {string} wanted its id, or none for all */
+  function ask(wanted) {
+    robot = wanted;
     for (const chip of all("[data-of]")) {
-      setAttribute(chip, "aria-pressed", String(chip.dataset.of === asked.robot));
+      setAttribute(chip, "aria-pressed", String(chip.dataset.of === robot));
     }
     redraw();
   }
 
-  for (const chip of all("[data-window]")) {
-    chip.addEventListener("click", () => ask({ window: chip.dataset.window }));
-  }
   for (const chip of all("[data-of]")) {
-    chip.addEventListener("click", () => ask({ robot: chip.dataset.of }));
+    chip.addEventListener("click", () => ask(String(chip.dataset.of)));
   }
   i18n.onChange(() => {
     draw();
@@ -89,10 +83,8 @@ export function start({ i18n }) {
   load();
 }
 
-/** @param {{window: string, robot: string}} asked */
-function queryOf({ window, robot }) {
-  return robot ? `window=${window}&robot=${robot}` : `window=${window}`;
-}
+/** @param {string} robot */
+const queryOf = (robot) => (robot ? `robot=${robot}` : "");
 
 /**
  * One row of measured and two of printed values, for each kind of data.

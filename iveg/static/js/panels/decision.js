@@ -22,7 +22,7 @@ import { delaysOf, makeTimeline } from "./timeline.js";
  *   person_id: string | null, started_at: string | null, ended_at: string | null,
  *   class_id: string | null, speed_factor: number | null,
  *   speed_before: number | null, speed_after: number | null,
- *   rule: {id: string | null, version: string | null, parameters: any},
+ *   rule_id: string | null, rule_version: string | null,
  *   links: Link[], sentence: {key: string, slots: Record<string, any>} | null}
  *   & import("./decision_map.js").Drawn} Decision
  */
@@ -148,10 +148,9 @@ function dateOf({ started_at }) {
  * @param {import("../core/i18n.js").I18n} i18n
  */
 function makeFacts(decision, i18n) {
-  const { x, y } = decision.position ?? { x: null, y: null };
-  const { id, version, parameters } = decision.rule;
-  const { looks, obstacle: laser } = parameters ?? {};
-  const slots = { ...parameters, ...looks, ...laser, ...decision, id, version, x, y };
+  const { rule_id: id, rule_version: version, rule_parameters: parameters } = decision;
+  const { looks, obstacle: laser } = parameters;
+  const slots = { ...parameters, ...looks, ...laser, ...decision, id, version };
   const seen = sourceOf(decision);
   const facts = [
     [`decision.fact.${seen === "told" ? "told" : "seen"}`, `decision.facts.${seen}`],
@@ -177,21 +176,21 @@ async function pastOf({ robot_id, person_id, started_at, ended_at }) {
 }
 
 /** @param {Decision} decision @param {import("../core/i18n.js").I18n} i18n */
-function aboutOf({ started_at, ended_at, rule, ...told }, i18n) {
+function aboutOf({ started_at, ended_at, rule_parameters, ...told }, i18n) {
   const { speed_before: before, speed_after: after } = told;
   const known = [before, after].every((speed) => speed !== null);
   const since = Date.parse(String(started_at));
   const until = ended_at === null ? Number.POSITIVE_INFINITY : Date.parse(ended_at);
   return {
     shade: { since, until, name: i18n.t("plot.key.decision") },
-    radiusM: rule.parameters?.radius_m ?? null,
+    radiusM: rule_parameters.radius_m ?? null,
     speedSaid: known ? i18n.t("plot.before_after", { before, after }) : "",
   };
 }
 
 /** How its cause is known. @param {Decision} decision */
-function sourceOf({ class_id, rule }) {
-  if (rule.parameters?.obstacle) return "laser";
+function sourceOf({ class_id, rule_parameters }) {
+  if (rule_parameters.obstacle) return "laser";
   if (class_id === null) return "told";
   return class_id === "laser" ? "walker" : "seen";
 }

@@ -2,11 +2,11 @@
  * A small picture of one decision, drawn from its record by the layers of the live map:
  * people and robots at its beginning.  Always on the light palette, so that it prints.
  *
- * @typedef {{position: {x: number, y: number} | null, class?: string | null,
+ * @typedef {{robot_id: string, x: number, y: number, yaw: number}} Place
+ * @typedef {{x: number | null, y: number | null, class?: string | null,
  *   observer: string | null, robot_id: string | null, in_sight: boolean | null,
  *   distance_m: number | null, confidence: number | null,
- *   rule: {parameters: {ring_m?: number} | null},
- *   places: {robot_id: string, x: number, y: number, yaw: number}[]}} Drawn
+ *   rule_parameters: Record<string, any> & {ring_m?: number, places?: Place[]}}} Drawn
  * @typedef {import("../core/protocol.js").GreenhouseMap} GreenhouseMap
  */
 
@@ -35,8 +35,9 @@ const BODY = { drive: "differential", length: 1, width: 0.6 };
  * @param {Drawn} decision
  * @param {GreenhouseMap | null} map
  */
-export function sceneOf({ position, places, rule, ...told }, map) {
-  if (!position) return null;
+export function sceneOf({ x, y, rule_parameters, ...told }, map) {
+  if (x === null || y === null) return null;
+  const { ring_m: zoneM = 2, places = [] } = rule_parameters;
   const acting = { robot_id: String(told.robot_id), distance_m: told.distance_m ?? 0 };
   const person = {
     id: "",
@@ -44,9 +45,10 @@ export function sceneOf({ position, places, rule, ...told }, map) {
     unknown: told.class === "obstacle",
     isThing: false,
     stage: /** @type {const} */ ("seen"),
-    ...position,
+    x,
+    y,
     ageS: 0,
-    zoneM: rule.parameters?.ring_m ?? 2,
+    zoneM,
     confidence: told.confidence ?? 1,
     observers: told.observer ? [told.observer] : [],
     acting: [{ ...acting, in_sight: told.in_sight !== false }],

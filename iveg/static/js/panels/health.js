@@ -67,7 +67,7 @@ export function createHealthPanel({ store, i18n, line }) {
         hop.age_s === null ? "" : i18n.t("health.age", { age: hop.age_s + waitedS });
       setText(need("small", item), `${i18n.t(`health.state.${hop.state}`)} ${age}`);
       // The sentence about the lag is enough, and in the reader's language.
-      const isTold = sentenceOf(hop).key.startsWith("health.lag.");
+      const isTold = sentenceOf(hop).key === "health.lag";
       const detail =
         hop.detail && hop.state !== "ok" && !isTold ? ` (${hop.detail})` : "";
       setText(need("p", item), `${said(hop)}${detail}`);

@@ -163,7 +163,6 @@ export function createLogPanel(app, decision) {
     list.focus();
   });
   store.subscribe("log", add);
-  store.subscribe("log/earlier", rebuild);
   store.subscribe("snapshot", rebuild);
   i18n.onChange(() => {
     chips.draw();

@@ -162,24 +162,6 @@ async def test_a_filter_that_cannot_be_used_is_refused_and_not_overlooked(
     assert answer.headers["content-type"] == "application/problem+json"
 
 
-async def test_13_18_a_csv_for_a_reader_is_one_that_her_excel_opens(
-    client: Client, past: Past
-) -> None:
-    past.holds(decision_record(distance_m=1.43))
-    asked = {"format": "csv", "language": "es", "since": "2023-11-14T00:00:00Z"}
-
-    answer = await client.get("/api/v1/decisions", params=asked)
-
-    assert answer.content.startswith(b"\xef\xbb\xbf")
-    assert 'filename="decisions.csv"' in answer.headers["content-disposition"]
-    [row] = csv.DictReader(
-        io.StringIO(answer.content.decode("utf-8-sig")), delimiter=";"
-    )
-    assert row["distance_m"] == "1,43"
-    assert row["started_at"] == "2023-11-14T22:13:20.000Z"
-    assert "50\u00a0%" in row["qué pasó"]
-
-
 async def test_a_spreadsheet_runs_nothing_from_a_csv(
     client: Client, past: Past
 ) -> None:
