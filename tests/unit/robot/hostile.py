@@ -99,18 +99,11 @@ class World(Rig):
         before, challenge = self.machine.holds, self.machine.challenge
         self.challenges = [*self.challenges, challenge][-20:]
         effects = machine()
+        after, state = self.machine.holds, self.machine.state(self.now)
+        told = self.payload, self.heard, self.rest_since
         self.transitions.append(
             Transition(
-                self.did,
-                self.now,
-                before,
-                self.machine.holds,
-                challenge,
-                self.machine.state(self.now),
-                effects,
-                self.payload,
-                self.heard,
-                self.rest_since,
+                self.did, self.now, before, after, challenge, state, effects, *told
             )
         )
         self.payload = None

@@ -50,7 +50,6 @@ def test_what_is_said_counts_and_the_rest_stays() -> None:
     ("text", "where"),
     [
         ("[ros]\nnamespace = '/a b'\n", ", ros.namespace: '/a b' is not a ROS"),
-        ("[topics]\nscan = '1scan'\n", ", topics.scan"),
         ("[topics]\nscna = 'scan'\n", ", topics.scna.[key]: is unknown; known are"),
         ("[drive]\nstamped_in = 1\n", ", drive.stamped_in: Input should be a valid"),
         ("[qos.scan]\ndepth = 0\n", ", qos.scan.depth: Input"),
