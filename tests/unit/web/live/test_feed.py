@@ -142,19 +142,6 @@ def test_a_robot_is_told_whole_once_and_then_what_changes(
     assert not {"robot_id", "mode", "profile"} & then.keys()
 
 
-def test_a_move_says_when_it_was_true_and_its_stamp_as_the_robot_sent_it(
-    desk: WebDesk, page: Page
-) -> None:
-    desk.drive("AGI", 1.23456)
-    now = desk.clock().mono
-    page.read()
-
-    (move,) = page.told("moves")
-    robot = desk.views.robot("AGI", desk.clock())
-    assert move[:4] == ["AGI", now, robot.age_s, 1.235]
-    assert move[-1] == robot.stamp
-
-
 def test_of_people_those_are_told_of_whom_there_is_more_to_say_than_an_age(
     desk: WebDesk, page: Page
 ) -> None:

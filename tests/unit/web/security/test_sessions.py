@@ -10,7 +10,7 @@ import pytest
 from iveg.adapters.access_file import AccessFile
 from iveg.domain import accounts
 from iveg.domain.accounts import AccessBook
-from iveg.web.security.roles import Principal
+from iveg.web.security.roles import Principal, Role
 from iveg.web.security.sessions import Sessions
 from tests.fakes.clock import FakeClock
 
@@ -72,18 +72,27 @@ def test_f42_the_time_that_iveg_was_down_counts_and_stop_is_left_for_twelve_hour
     assert gone is None
 
 
-def test_use_keeps_a_session_alive_but_not_beyond_a_day(clock: FakeClock) -> None:
+@pytest.mark.parametrize(
+    ("role", "after_h", "left"),
+    [
+        # Used, but not beyond a day.
+        ("operator", [5] * 6, ["operator"] * 4 + ["expired"] * 2),
+        # Unused for thirty days.
+        ("viewer", [29 * 24, 34, 12], ["viewer", "expired", None]),
+    ],
+)
+def test_a_session_is_alive_for_as_long_as_its_role_says_and_may_then_stop(
+    clock: FakeClock, role: Role, after_h: list[int], left: list[Role | None]
+) -> None:
     sessions = Sessions(clock, AccessBook())
-    token = sessions.open("Ana", "operator")
+    token = sessions.open("Ana", role)
 
-    roles = []
-    for _ in range(6):
-        clock.now += 5 * HOUR
-        found = sessions.find(token)
-        assert found is not None
-        roles.append(found.role)
+    found = []
+    for hours in after_h:
+        clock.now += hours * HOUR
+        found.append(sessions.find(token))
 
-    assert roles == ["operator"] * 4 + ["expired"] * 2
+    assert [one and one.role for one in found] == left
 
 
 def test_watching_alone_does_not_keep_a_session_alive(clock: FakeClock) -> None:
@@ -91,14 +100,12 @@ def test_watching_alone_does_not_keep_a_session_alive(clock: FakeClock) -> None:
     principal = sessions.find(sessions.open("Ana", "operator"))
     assert principal is not None
 
-    roles = []
+    left = []
     for hours in (11, 2):
         clock.now += hours * HOUR
-        current = sessions.current(principal)
-        assert current is not None
-        roles.append(current.role)
+        left.append(sessions.current(principal))
 
-    assert roles == ["operator", "expired"]
+    assert [one and one.role for one in left] == ["operator", "expired"]
 
 
 def test_sessions_are_bounded_and_the_longest_idle_gives_way(
@@ -114,20 +121,6 @@ def test_sessions_are_bounded_and_the_longest_idle_gives_way(
 
     there = [sessions.find(token) is not None for token in (first, second, third)]
     assert there == [True, False, True]
-
-
-def test_a_viewer_stays_for_thirty_days_unused_and_may_then_stop(
-    start: Restart, clock: FakeClock
-) -> None:
-    sessions = start()
-    token = sessions.open("Wall", "viewer")
-
-    found = []
-    for days in (29, 1.4, 0.5):
-        clock.now += days * 24 * HOUR
-        found.append(sessions.find(token))
-
-    assert [one and one.role for one in found] == ["viewer", "expired", None]
 
 
 def test_a_sign_of_life_is_kept_within_a_minute(
