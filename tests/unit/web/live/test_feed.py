@@ -115,16 +115,6 @@ def test_without_credit_a_change_wakes_nobody(desk: WebDesk, page: Page) -> None
     assert page.subscriber.wants_telemetry
 
 
-def test_nothing_new_is_no_frame(desk: WebDesk, page: Page) -> None:
-    desk.drive("AGI")
-    page.read_all()
-    desk.clock.now += 1.0
-    desk.hub.changed("robots/AGII/scan")
-
-    assert page.read() is None
-    assert page.feed.wait_s(desk.clock().mono) is None
-
-
 def test_a_robot_is_told_whole_once_and_then_what_changes(
     desk: WebDesk, page: Page
 ) -> None:
