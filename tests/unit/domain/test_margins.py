@@ -57,7 +57,6 @@ def test_of_nobody_and_of_who_was_not_seen_for_ten_seconds_there_is_no_margin() 
     nobody = LeastMargins([], scene.everyone, at(0.0))
 
     assert margins(scene).of_robot("AGI") is None
-    assert nobody.of_person(scene.everyone[0].person_id) is None
 
 
 @pytest.mark.parametrize(

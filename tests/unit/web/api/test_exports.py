@@ -46,17 +46,9 @@ def test_a_list_is_written_whole_as_each_form(data: Path) -> None:
     assert [*data.glob("*.part")] == []
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (["--since", "yesterday"], "--since='yesterday'"),
-        (["--since", "2023-11-15", "--until", "2023-11-14"], "before --until"),
-        (["--out", "nowhere/at/all.csv"], "No such file"),
-    ],
-)
 def test_what_cannot_be_exported_is_one_sentence(
-    data: Path, words: list[str], says: str, capsys: pytest.CaptureFixture[str]
+    data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["export", "odometry", *words]) != 0
+    assert main(["export", "odometry", "--out", f"{data}/nowhere/at/all.csv"]) != 0
     (sentence,) = capsys.readouterr().err.splitlines()
-    assert says in sentence
+    assert "No such file" in sentence

@@ -10,18 +10,13 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
-import httpx
 import pytest
-from fastapi import FastAPI
 from playwright.sync_api import Browser, expect
 
 from iveg.domain.limits import LIMITS
-from iveg.web.pages import routes
 from iveg.web.security.headers import CONTENT_SECURITY_POLICY
 from tests.browsers import running_browser
-from tests.builders import START
 from tests.e2e.reading import serious
-from tests.fakes.doors import authenticator
 
 STATIC = Path(__file__).parents[4] / "iveg" / "static"
 _PAGE = (
@@ -61,18 +56,6 @@ class Served(SimpleHTTPRequestHandler):
 
     def log_message(self, format: str, *args: Any) -> None:  # noqa: A002 - the base's
         """Say nothing."""
-
-
-async def test_the_worker_is_open_and_never_from_a_cache() -> None:
-    app = FastAPI()
-    app.state.authenticator = authenticator(lambda: START)
-    app.include_router(routes.service_worker_router())
-    transport = httpx.ASGITransport(app=app)
-    async with httpx.AsyncClient(transport=transport, base_url="http://iveg") as client:
-        answer = await client.get("/sw.js")
-
-    assert answer.headers["cache-control"] == "no-cache"
-    assert answer.headers["content-type"].startswith("text/javascript")
 
 
 @pytest.fixture
