@@ -6,6 +6,7 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 
+from iveg.adapters.fiware_http import TokenGrant
 from iveg.adapters.identity_provider import Attempt, Client, Keyrock, Vouched
 from iveg.adapters.oidc import OpenIdProvider
 from iveg.domain.errors import HopError, SignOnError
@@ -204,8 +205,9 @@ async def test_keyrock_tells_who_it_is_at_its_own_address(
 
 
 def test_nothing_that_is_secret_is_shown_by_a_traceback() -> None:
-    attempt = Attempt(BACK)
-    shown = repr((attempt, Client("https://a.test", CLIENT, SECRET, "")))
+    attempt, client = Attempt(BACK), Client("https://a.test", CLIENT, SECRET, "")
+    grant = TokenGrant("http://a/token", CLIENT, SECRET, "ana", "a-password")
+    shown = repr((attempt, client, grant))
 
-    secret = (SECRET, attempt.state, attempt.nonce, attempt.verifier)
+    secret = (SECRET, attempt.state, attempt.nonce, attempt.verifier, "a-password")
     assert [one for one in secret if one in shown] == []
