@@ -180,10 +180,3 @@ async def test_a_stop_over_fiware_waits_for_no_token_longer_than_for_orion(
 
     assert time.monotonic() - begun < 3.0
     assert place.pep.seen == []
-
-
-def test_what_is_secret_stands_in_no_traceback() -> None:
-    shown = repr(TokenGrant("http://a/token", CLIENT, SECRET, USER, PASSWORD))
-
-    assert SECRET not in shown
-    assert PASSWORD not in shown

@@ -129,12 +129,12 @@ async def test_places_go_and_all_else_of_the_rows_stays(
 async def test_what_goes_on_is_kept_whatever_their_age(
     engine: Engine, database_url: str
 ) -> None:
-    rows = [
+    remember(
+        database_url,
         decision_record(started_at=OLD, ended_at=None),
         alert_record(raised_at=OLD, last_raised_at=OLD, cleared_at=None),
         command_record(command_id="held", requested_at=OLD, state="STANDING"),
-    ]
-    remember(database_url, *rows)
+    )
 
     for step in PURGE_STEPS:
         if step.kind == "decisions":

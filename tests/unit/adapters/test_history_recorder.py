@@ -28,7 +28,7 @@ from tests.fakes.records import (
 )
 from tests.patience import PATIENCE_S, until
 
-EVERYTHING = {
+EVERYTHING: dict[str, Record] = {
     "alerts": alert_record(),
     "audit": audit_record(),
     "command_events": command_event_record(),

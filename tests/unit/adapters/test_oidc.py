@@ -6,6 +6,7 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 
+from iveg.adapters.fiware_http import TokenGrant
 from iveg.adapters.identity_provider import Attempt, Client, Vouched
 from iveg.adapters.oidc import OpenIdProvider
 from iveg.domain.errors import HopError, SignOnError
@@ -185,8 +186,9 @@ async def test_a_bad_provider_is_refused_in_bounded_time_and_memory(
 
 
 def test_nothing_that_is_secret_is_shown_by_a_traceback() -> None:
-    attempt = Attempt(BACK)
-    shown = repr((attempt, Client("https://a.test", CLIENT, SECRET, "")))
+    attempt, client = Attempt(BACK), Client("https://a.test", CLIENT, SECRET, "")
+    grant = TokenGrant("http://a/token", CLIENT, SECRET, "ana", "a-password")
+    shown = repr((attempt, client, grant))
 
-    secret = (SECRET, attempt.state, attempt.nonce, attempt.verifier)
+    secret = (SECRET, attempt.state, attempt.nonce, attempt.verifier, "a-password")
     assert [one for one in secret if one in shown] == []

@@ -109,6 +109,15 @@ async def test_a_damaged_subscription_is_made_right(damage: dict[str, Any]) -> N
     assert (await ensure_subscriptions(store, URL, TOKEN, WANTED)).mended == ()
 
 
+async def test_a_new_address_or_secret_reaches_every_subscription() -> None:
+    store = FakeStore()
+    first = await ensure_subscriptions(store, URL, TOKEN, WANTED)
+    for url, token in ((URL + "2", TOKEN), (URL + "2", "cd" * 16)):
+        again = await ensure_subscriptions(store, url, token, WANTED)
+        assert again.ids == first.ids
+        assert len(again.mended) == len(WANTED)
+
+
 async def test_doubles_and_leftovers_of_ours_go_and_others_stay() -> None:
     store = FakeStore()
     await ensure_subscriptions(store, URL, TOKEN, WANTED)
