@@ -55,7 +55,7 @@ class SignOnDesk(WebDesk):
     def page(self) -> httpx.AsyncClient:
         return self._client(OWN)
 
-    async def answer(self, page: httpx.AsyncClient, path: str = "/signin/sso") -> str:
+    async def approved(self, page: httpx.AsyncClient, path: str = "/signin/sso") -> str:
         """Where the provider's page sends Ana back to."""
         sent = await page.get(path)
         assert sent.status_code == 303, sent.text
@@ -65,7 +65,7 @@ class SignOnDesk(WebDesk):
         self, page: httpx.AsyncClient, path: str = "/signin/sso"
     ) -> httpx.Response:
         """Sign in on the provider's page."""
-        return await page.get(await self.answer(page, path), headers=PAGES)
+        return await page.get(await self.approved(page, path), headers=PAGES)
 
     def who(self, page: httpx.AsyncClient) -> Principal | None:
         cookie = page.cookies.get("iveg")
@@ -146,17 +146,17 @@ async def test_an_answer_counts_once_in_its_own_browser_and_for_ten_minutes(
     desk: SignOnDesk,
 ) -> None:
     async with desk.page() as page, desk.page() as other:
-        back = await desk.answer(page)
+        back = await desk.approved(page)
         entered = await page.get(back)
         again = await page.get(back)
 
         await other.get("/signin/sso")
-        back = await desk.answer(page)
+        back = await desk.approved(page)
         stolen = await other.get(back)
         # It is left to the browser that began.
         own = await page.get(back)
 
-        late = await desk.answer(page)
+        late = await desk.approved(page)
         desk.clock.now += 601.0
         over = await page.get(late)
         made_up = await page.get(f"{CALLBACK}?code=x&state=x")
