@@ -132,6 +132,13 @@ def test_a_limit_with_one_of_two_reasons_left_is_not_over() -> None:
 # --- several reasons --------------------------------------------------------------
 
 
+def test_f48_two_rings_are_half_speed_and_not_a_quarter() -> None:
+    scene = watching(Scene())
+    scene.look("AGI", person(1.5), person(-1.5))
+
+    assert scene.judge()["AGI"].speed_factor == 0.5
+
+
 def test_a_person_is_the_reason_that_is_told_before_a_nearer_peer() -> None:
     scene = Scene()
     scene.drive("AGI", 0.0)
