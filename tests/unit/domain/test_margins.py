@@ -51,7 +51,7 @@ def test_a_standing_robot_needs_what_the_person_may_walk_and_old_data_more() -> 
     )
 
 
-def test_of_nobody_and_of_who_was_not_seen_for_ten_seconds_there_is_no_margin() -> None:
+def test_of_who_was_not_seen_for_ten_seconds_there_is_no_margin() -> None:
     scene = met(looked_s=10.1)
     scene.drive("AGI", 0.0)
 
