@@ -108,7 +108,7 @@ async def test_the_right_link_signs_in_whatever_wrong_ones_nobody_quotes_came_be
 async def test_whoever_has_to_wait_to_sign_in_can_stop_all_the_same(
     operator: Client,
 ) -> None:
-    for _ in range(4):
+    for _ in range(6):
         await enter(operator, "wrong")
 
     answers = {
