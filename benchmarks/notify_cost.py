@@ -138,7 +138,7 @@ async def whole_way(dss: Dss, line: Line, bodies: list[bytes]) -> float:
 
 
 async def rows(dss: Dss) -> list[list[str]]:
-    dss.provisioner._subscription_ids = frozenset({SUBSCRIPTION})
+    dss.provisioner.subscription_ids = frozenset({SUBSCRIPTION})
     line = Line(create_app(dss), dss.notify_secret)
     table = []
     for kind in ("odometry", "scan", "detections"):
