@@ -24,14 +24,12 @@ from iveg.models.history import (
     OdometryRow,
 )
 from iveg.models.people import DetectionRow, KeptDetection
-from iveg.models.robot import Device
 from iveg.models.typescript import TOLD
 
 SHOWN: Final[tuple[type[Model], ...]] = (
     *TOLD,
     AcknowledgedAlerts,
     Day,
-    Device,
     KeptDetection,
     DetectionRow,
     OdometryRow,

@@ -6,7 +6,7 @@ from pydantic import Field, create_model
 
 from iveg.domain import goals, margins, situation
 from iveg.domain.kinds import SENSED, Kind
-from iveg.domain.observations import Instant, Observation
+from iveg.domain.observations import Instant
 from iveg.domain.quantities import quantities_of, value_of
 from iveg.domain.robot_state import Link, RobotState
 from iveg.domain.rule import foresight
@@ -24,44 +24,6 @@ from iveg.models.base import (
     Twist,
 )
 from iveg.models.command import Command
-
-
-class Device(Model):
-    """One device of a robot.
-
-    Attributes:
-        device: Device id.
-        robot_id: Whose.
-    """
-
-    device: str
-    robot_id: str
-    kind: str = Field(
-        description="``robot`` for the device of all orders, else what it measures."
-    )
-    age_s: Thousandth | None = Field(
-        description="Since something came of it; null: never."
-    )
-
-    @classmethod
-    def of(
-        cls,
-        robot: RobotState,
-        suffix: str,
-        kind: type[Observation] | None,
-        now: Instant,
-    ) -> Self:
-        """The device of a robot with a suffix; without a kind, that of all orders."""
-        heard_at = robot.heard_at
-        if kind is not None:
-            received = robot.received_at(kind)
-            heard_at = None if received is None else received.mono
-        return cls(
-            device=robot.robot_id + suffix,
-            robot_id=robot.robot_id,
-            kind=suffix[1:] or "robot",
-            age_s=None if heard_at is None else max(0.0, now.mono - heard_at),
-        )
 
 
 class SensorReading(Model):

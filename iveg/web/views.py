@@ -25,7 +25,6 @@ from iveg.models.people import Person as PersonModel
 from iveg.models.robot import (
     Applied,
     Detector,
-    Device,
     Encounter,
     Goal,
     Hold,
@@ -40,7 +39,6 @@ from iveg.models.robot import (
 )
 from iveg.models.rule import Rule
 from iveg.models.snapshot import Climate, Tile
-from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.pipeline import Pipeline
 from iveg.vital.health_monitor import HopHealth
 
@@ -175,14 +173,6 @@ class Views:
         swept = scan.points(robot.scan_pose).tolist()
         points = [(round(x, 3), round(y, 3)) for x, y in swept]
         return Scan(robot_id=robot_id, stamp=scan.origin.stamp, points=points)
-
-    def devices(self, now: Instant) -> list[Device]:
-        """Each robot's devices at the IoT Agent, and when each last sent something."""
-        return [
-            Device.of(robot, device.suffix, device.of, now)
-            for robot in self._world.robots.values()
-            for device in ROBOT_DEVICES
-        ]
 
     # --- people and looks ---------------------------------------------------------
 

@@ -93,7 +93,6 @@ def write_moisture(_: ros.Header, moisture: Any) -> Float32:
                 '    "battery_low": "',
                 f'    "soil_moisture_low": "{{robot}}: {name} {{level:0}} %",\n',
             ),
-            ('      "battery": "', f'      "soil_moisture": "{name}",\n'),
         )
         for language, name in (("en", "Soil moisture"), ("es", "Humedad del suelo"))
     },
@@ -126,7 +125,6 @@ from iveg.adapters.reconciler import WANTED_OF_ALL
 from iveg.domain.observations import Instant, Received, SoilMoisture
 from iveg.domain.records import ReadingRecord
 from iveg.domain.world import World
-from iveg.models.robot import Device
 from iveg.models.robot import Robot
 from iveg.ngsi import codec, names
 from iveg.robot.uplink import Origins, Uplink
@@ -155,8 +153,6 @@ async def main():
     robot = desk.world.robot("AGI")
     told = Robot.sensed(robot, desk.clock())["soil_moisture"]
     assert told.model_dump() == {"age_s": 0.1, "percentage": 12.5}, told
-    device = Device.of(robot, "_soil_moisture", SoilMoisture, desk.clock())
-    assert device.age_s == 0.1, device
 
 asyncio.run(main())
 """

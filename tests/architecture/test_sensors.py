@@ -22,7 +22,6 @@ def words_of(kind: Kind) -> set[str]:
     return {
         *(f"robot.{kind.name}{ending}" for ending in endings),
         *low,
-        f"fleet.measures.{kind.name}",
     }
 
 

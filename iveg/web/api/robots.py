@@ -23,7 +23,7 @@ from iveg.models.base import (
 )
 from iveg.models.health import Health
 from iveg.models.people import Person
-from iveg.models.robot import Device, Robot
+from iveg.models.robot import Robot
 from iveg.models.snapshot import Climate, Tile
 from iveg.vital.evaluate import Evaluator
 from iveg.vital.ports import Clock
@@ -59,11 +59,6 @@ def router(views: Views, clock: Clock) -> APIRouter:
     async def people() -> Response:
         """Every known person, in their three stages."""
         return Json(Listing(items=views.people(clock())))
-
-    @routes.get("/devices", response_model=Listing[Device])
-    async def devices() -> Response:
-        """Each robot's devices at the IoT Agent, and the time of their last message."""
-        return Json(Listing(items=views.devices(clock())))
 
     @routes.get("/map", response_model=GreenhouseMap)
     async def greenhouse() -> Response:

@@ -1,8 +1,7 @@
 /**
- * The Fleet page: the data path as a diagram, each robot, and each of its devices.
+ * The Fleet page: the data path as a diagram, and each robot.
  */
 
-import { readApi } from "../core/api.js";
 import { aboutAge, ageOf, isSilent, linkOfRobot } from "../core/clock.js";
 import { capitalised, sentenceOf, situationOf } from "../core/situation.js";
 import {
@@ -22,16 +21,11 @@ import { heardOf, judgeDataPath } from "./health_sentence.js";
 /** @typedef {import("../core/i18n.js").I18n} I18n */
 /** @typedef {import("../core/store.js").ConnectionState} ConnectionState */
 
-/** @typedef {{device: string, robot_id: string, kind: string, age_s: number | null}} Device */
-
 const TICK_MS = 500;
-const READ_MS = 5000;
 
 /** @param {import("../core/page.js").Page} page */
 export function start(page) {
   const { store, i18n } = page;
-  /** @type {{items: Device[], readMs: number}} */
-  let devices = { items: [], readMs: 0 };
 
   function draw() {
     const robots = [...store.robots().values()];
@@ -44,17 +38,6 @@ export function start(page) {
       robots.map((robot) => machineCells(robot, i18n, store.connection.state)),
     );
     hideEmptyColumns(need("#machines"));
-    fillRows(
-      "#devices tbody",
-      devices.items.map((device) => deviceCells(device, devices.readMs, i18n)),
-    );
-  }
-
-  /** Messages of each device as the server counts them, from before this page was opened. */
-  async function load() {
-    const { status, body } = await readApi("devices");
-    if (status === 200) devices = { items: body.items, readMs: performance.now() };
-    draw();
   }
 
   /** @param {Robot[]} robots */
@@ -104,25 +87,8 @@ export function start(page) {
   store.subscribe("connection", draw);
   i18n.onChange(draw);
   setInterval(draw, TICK_MS);
-  setInterval(load, READ_MS);
-  store.subscribe("snapshot", load);
+  store.subscribe("snapshot", draw);
   draw();
-  load();
-}
-
-/**
- * @param {Device} device
- * @param {number} readMs when the server said so
- * @param {I18n} i18n
- * @returns {(string | Node)[]}
- */
-function deviceCells({ device, kind, age_s }, readMs, i18n) {
-  const age = ageOf({ age_s, receivedAtMs: readMs });
-  return [
-    make("code", "", device),
-    i18n.has(`fleet.measures.${kind}`) ? i18n.t(`fleet.measures.${kind}`) : kind,
-    ageSaid(age, i18n),
-  ];
 }
 
 /** Hides columns in which no robot has a value. @param {HTMLElement} table */

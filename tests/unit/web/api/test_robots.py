@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iveg.domain.observations import Battery, Hold
-from tests.builders import detection, scan
+from iveg.domain.observations import Hold
+from tests.builders import scan
 from tests.unit.web.desk import WebDesk
 
 
@@ -44,30 +44,6 @@ async def test_the_mode_is_what_the_robot_says(
 
     assert told["mode"] == mode
     assert [one["id"] for one in told["holds"]] == [hold.id for hold in holds]
-
-
-async def test_13_11_the_server_tells_when_each_device_was_last_heard_of() -> None:
-    desk = WebDesk()
-    desk.drive("AGI", 1.0)
-    desk.clock.now = 40.0
-    desk.look("AGI", detection("farmer", 1.0))
-    desk.hear(Battery("AGI", desk.next_origin(), 0.5))
-    desk.clock.now = 42.0
-
-    told = await get(desk, "/devices")
-
-    ages = {
-        one["device"]: one["age_s"] for one in told["items"] if one["robot_id"] == "AGI"
-    }
-    assert ages == {
-        "AGI": 2.0,
-        "AGI_odom": 42.0,
-        "AGI_lidar2D": None,
-        "AGI_yolox_bounding_boxes": 2.0,
-        "AGI_safety": None,
-        "AGI_nav": None,
-        "AGI_battery": 2.0,
-    }
 
 
 async def test_the_costmap_is_rows_from_the_south_western_corner_of_all_or_one() -> (
