@@ -63,7 +63,7 @@ def bare(domain: int) -> None:
     """Take and decode every message that the robot is sent, as they come."""
     participant, waitset, readers = _participant(domain)
     for name, message in (SENSORS | WISHES).items():
-        kind = announced(message.STORE, message.ROS)
+        kind = announced(message.ROS)
         topic = Topic(participant, names.dds_topic(name), kind)
         readers.append((message, DataReader(participant, topic, _HEARD)))
     conditions = [ReadCondition(reader, _ANY) for _, reader in readers]
@@ -80,7 +80,7 @@ def bare(domain: int) -> None:
 def echo(domain: int) -> None:
     """Answer each twist with itself, decoded and encoded."""
     participant, waitset, _ = _participant(domain)
-    kind = announced(ros.Twist.STORE, ros.Twist.ROS)
+    kind = announced(ros.Twist.ROS)
     heard = Topic(participant, names.dds_topic("/echo_in"), kind)
     said = Topic(participant, names.dds_topic("/echo_out"), kind)
     reader = DataReader(participant, heard, _HEARD)

@@ -36,7 +36,7 @@ from rosbags.interfaces import Nodetype
 from iveg.adapters.dds_network import DdsNetwork
 from iveg.domain.errors import HopError
 from iveg.ros2.cdr import read_user_data, user_data
-from iveg.ros2.messages import Message
+from iveg.ros2.messages import STORE, Message
 from iveg.ros2.names import Endpoint, Qos, dds_topic, dds_type, ros_topic, ros_type
 
 # --- types and qualities of service ------------------------------------------------
@@ -47,7 +47,7 @@ _PLAIN = {"bool": bool, "string": str}
 
 
 @cache
-def announced(store: Any, ros: str) -> type[IdlStruct]:
+def announced(ros: str) -> type[IdlStruct]:
     """The type that DDS announces for a message, with all within it.
 
     Its samples stay bytes: Cyclone's reader and writer ask a type to deserialize and
@@ -57,7 +57,7 @@ def announced(store: Any, ros: str) -> type[IdlStruct]:
     def idl(kind: Any) -> Any:
         match kind:
             case (Nodetype.NAME, nested):
-                return announced(store, nested)
+                return announced(nested)
             case (Nodetype.SEQUENCE, (inner, _)):
                 return types.sequence[idl(inner)]
             case (Nodetype.ARRAY, (inner, count)):
@@ -70,7 +70,7 @@ def announced(store: Any, ros: str) -> type[IdlStruct]:
         made.payload = data
         return made
 
-    _, fields = store.fielddefs[ros]
+    _, fields = STORE.fielddefs[ros]
     members = {name: idl(kind) for name, kind in fields}
     typename, name = dds_type(ros).replace("::", "."), ros.rpartition("/")[2]
     kind: type[IdlStruct] = make_idl_struct(name, typename, members, dataclassify=False)
@@ -290,7 +290,7 @@ class Dds(AbstractContextManager["Dds"]):
         return DdsQos(data, base=write_qos(qos))
 
     def _topic(self, name: str, message: type[Message]) -> Topic:
-        kind = announced(message.STORE, message.ROS)
+        kind = announced(message.ROS)
         if (name, kind) not in self._topics:
             made = Topic(self._participant, dds_topic(name), kind)
             self._topics[name, kind] = made

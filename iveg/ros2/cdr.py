@@ -3,40 +3,35 @@
 Arrays that are read are views of the payload, sequences are lists.
 """
 
-from contextlib import suppress
-from dataclasses import fields
 from functools import cache
 from typing import Any
 
 from rosbags.serde import SerdeError
 
 from iveg.domain.errors import UnreadableError
-from iveg.ros2.messages import Message, definitions
+from iveg.ros2.messages import STORE, Message
 
 
 def read(message: type[Message], payload: bytes) -> Any:
     """Read one message, after which up to three bytes of padding may come.
 
     Args:
-        message: Its type; of several definitions the newest counts that fits.
+        message: Its type.
         payload: With its encapsulation.
 
     Raises:
         UnreadableError: bytes that this type does not describe.
     """
-    for form in definitions(message):
-        with suppress(SerdeError):
-            found = form.STORE.deserialize_cdr(memoryview(payload), form.ROS)
-            if form is message:
-                return found
-            kind: Any = message
-            return kind(*(getattr(found, member.name) for member in fields(kind)))
-    raise UnreadableError("unreadable", f"{message.ROS} of {len(payload)} bytes")
+    try:
+        return STORE.deserialize_cdr(memoryview(payload), message.ROS)
+    except SerdeError as error:
+        size = f"{message.ROS} of {len(payload)} bytes"
+        raise UnreadableError("unreadable", size) from error
 
 
 def write(message: Message) -> bytes:
     """The bytes of one message, with its encapsulation; the lowest comes first."""
-    written = message.STORE.serialize_cdr(message, message.ROS, little_endian=True)
+    written = STORE.serialize_cdr(message, message.ROS, little_endian=True)
     return bytes(written)
 
 
@@ -51,7 +46,7 @@ _HASH, _GATE = "typehash", "iveggate"
 @cache
 def type_hash(message: type[Message]) -> str:
     """``RIHS01_`` and 64 hexadecimal digits."""
-    return str(message.STORE.hash_rihs01(message.ROS))
+    return str(STORE.hash_rihs01(message.ROS))
 
 
 def user_data(message: type[Message], gate: str = "") -> bytes:

@@ -23,8 +23,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 # ``yolo_msgs`` (mgonzs13/yolo_ros, 2026); forks with other fields have another type
 # hash.
 
-_BOX = "bboxes_ex_msgs/msg/BoundingBox"
-OLDER_TEXTS = {
+_TEXTS = {
     "vision_msgs/msg/ObjectHypothesis": "string class_id\nfloat64 score\n",
     "vision_msgs/msg/ObjectHypothesisWithPose": "ObjectHypothesis hypothesis\n"
     "geometry_msgs/PoseWithCovariance pose\n",
@@ -42,9 +41,10 @@ OLDER_TEXTS = {
     "ObjectHypothesisWithPose[] results\nBoundingBox2D bbox\nstring id\n",
     "vision_msgs/msg/Detection2DArray": "std_msgs/Header header\n"
     "Detection2D[] detections\n",
-    _BOX: "float32 probability\nuint16 xmin\nuint16 ymin\nuint16 xmax\nuint16 ymax\n"
+    "bboxes_ex_msgs/msg/BoundingBox": "float32 probability\nuint16 xmin\nuint16 ymin\n"
+    "uint16 xmax\nuint16 ymax\n"
     "uint16 id\nuint16 img_width\nuint16 img_height\nint32 center_dist\n"
-    "string class_id\n",
+    "string class_id\nuint16 class_id_int\n",
     "bboxes_ex_msgs/msg/BoundingBoxes": "std_msgs/Header header\n"
     "std_msgs/Header image_header\nBoundingBox[] bounding_boxes\n",
     "gb_visual_detection_3d_msgs/msg/BoundingBox3d": "string object_name\n"
@@ -70,18 +70,9 @@ OLDER_TEXTS = {
     "yolo_msgs/msg/DetectionArray": "std_msgs/Header header\n"
     "yolo_msgs/Detection[] detections\n",
 }
-_NEWER = OLDER_TEXTS | {_BOX: OLDER_TEXTS[_BOX] + "uint16 class_id_int\n"}
-"""The definitions since July 2022."""
-
-
-def _store_with(texts: dict[str, str]) -> Any:
-    store = get_typestore(Stores.ROS2_JAZZY)
-    for name, text in texts.items():
-        store.register(get_types_from_msg(text, name))
-    return store
-
-
-STORE, NEWER_STORE = _store_with(OLDER_TEXTS), _store_with(_NEWER)
+STORE: Any = get_typestore(Stores.ROS2_JAZZY)
+for _name, _text in _TEXTS.items():
+    STORE.register(get_types_from_msg(_text, _name))
 
 # --- classes ----------------------------------------------------------------------
 
@@ -91,15 +82,11 @@ class Message(ABC):
 
     Attributes:
         ROS: Its ROS name, such as ``nav_msgs/msg/Odometry``.
-        STORE: Definitions of it and of all within it.
-        NEWER: Another definition of the same name, by which it is read as well.
     """
 
     __slots__ = ()
     __dataclass_fields__: ClassVar[dict[str, Any]]
     ROS: ClassVar[str]
-    STORE: ClassVar[Any] = STORE
-    NEWER: ClassVar["type[Message] | None"] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,49 +111,43 @@ class Time(Message):
 
 _USUAL = {"geometry_msgs/msg/Quaternion": {"w": 1.0}}
 """Values of fields that are not zero unless given."""
-for _store in (STORE, NEWER_STORE):
-    _store.types[Time.ROS] = Time
+STORE.types[Time.ROS] = Time
 
 
-def message(ros: str, store: Any = STORE, newer: Any = None) -> Any:
-    """The class of a ROS message, made once a store; ``newer``: its ``NEWER``."""
-    made = store.types[ros]
+def message(ros: str) -> Any:
+    """The class of a ROS message, made once."""
+    made = STORE.types[ros]
     if not issubclass(made, Message):
         usual = _USUAL.get(ros, {})
         members = [
-            (name, Any, usual.get(name, _zero(store, kind)))
-            for name, kind in store.fielddefs[ros][1]
+            (name, Any, usual.get(name, _zero(kind)))
+            for name, kind in STORE.fielddefs[ros][1]
         ]
-        made = store.types[ros] = make_dataclass(
+        made = STORE.types[ros] = make_dataclass(
             ros.rpartition("/")[2],
             members,
             bases=(Message,),
-            namespace={"ROS": ros, "STORE": store, "NEWER": newer},
+            namespace={"ROS": ros},
             frozen=True,
             slots=True,
         )
     return made
 
 
-def _zero(store: Any, kind: Any) -> Any:
+def _zero(kind: Any) -> Any:
     """Default of a field of this kind."""
     match kind:
         case (Nodetype.NAME, nested):
-            return field(default_factory=message(nested, store))
+            return field(default_factory=message(nested))
         case (Nodetype.ARRAY, ((Nodetype.BASE, (base, _)), count)):
             return field(default_factory=partial(np.zeros, count, base))
         case (Nodetype.SEQUENCE, ((Nodetype.BASE, (base, _)), _)) if base != "string":
             return field(default_factory=partial(np.zeros, 0, base))
         case (Nodetype.SEQUENCE, (inner, _)):
-            _zero(store, inner)  # its class is made, too
+            _zero(inner)  # its class is made, too
             return ()
         case (_, (base, _)):
             return "" if base == "string" else np.dtype(base).type().item()
-
-
-def definitions(message: type[Message]) -> tuple[type[Message], ...]:
-    """All definitions of a message, the newest first."""
-    return (message,) if message.NEWER is None else (message.NEWER, message)
 
 
 # --- messages ---------------------------------------------------------------------

@@ -92,7 +92,7 @@ def test_a_message_of_another_layout_never_arrives(dds: Dds, other: Dds) -> None
 
 @pytest.mark.parametrize(
     "message",
-    [d.BoundingBoxes, d.NumberedBoundingBoxes, d.BoundingBoxes3d, d.DetectionArray],
+    [d.BoundingBoxes, d.BoundingBoxes3d, d.DetectionArray],
 )
 def test_a_detector_is_met_in_its_type_and_tells_its_hash(
     dds: Dds, domain: int, message: type[Message]

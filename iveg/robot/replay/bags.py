@@ -28,7 +28,7 @@ from iveg.ros2 import cdr
 from iveg.ros2 import detector_messages as d
 from iveg.ros2 import messages as ros
 from iveg.ros2.cdr import type_hash
-from iveg.ros2.messages import Message, definitions
+from iveg.ros2.messages import Message
 
 # --- which topics are read, and as what -----------------------------------------------
 
@@ -119,7 +119,7 @@ class BagPlan:
     def _use(self, topic: BagTopic, role: str) -> None:
         """Read a topic, unless its type has other fields under the same name."""
         form = next(form for form in _FORMS if topic.type == form.ROS)
-        if topic.type_hash in ("", *map(type_hash, definitions(form))):
+        if topic.type_hash in ("", type_hash(form)):
             self.read[topic.name] = Use(topic, role, form)
             self._fates[topic] = role
         else:

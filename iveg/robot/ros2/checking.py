@@ -11,7 +11,7 @@ from iveg.robot.ros2.outputs import message_of
 from iveg.robot.ros2.reading import InputFaults
 from iveg.robot.ros2.topics import TOPICS, sensed_topics
 from iveg.ros2.cdr import type_hash
-from iveg.ros2.messages import Message, definitions
+from iveg.ros2.messages import Message
 from iveg.ros2.names import Endpoint, Qos
 
 # --- lookout ----------------------------------------------------------------------
@@ -189,7 +189,7 @@ def _badness(
         return f"not {twist.ROS}: drive.stamped_in"
     for end in ends:
         form = row.form(end.type)
-        if form and end.type_hash not in ("", *map(type_hash, definitions(form))):
+        if form and end.type_hash not in ("", type_hash(form)):
             return f"other fields: {end.type_hash} there, {type_hash(form)} here"
         if config.quality(topic).lacks(end.qos):
             return f"another quality of service is asked for: qos.{topic}"

@@ -31,7 +31,7 @@ from iveg.robot.ros2.reading import InputFaults, Stamps
 from iveg.robot.ros2.topics import ROS_SENSORS, TOPICS, RosSensor, sensed_topics
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as ros
-from iveg.ros2.messages import Message, definitions
+from iveg.ros2.messages import STORE, Message
 from iveg.ros2.names import Endpoint
 
 # --- subscriptions ----------------------------------------------------------------
@@ -58,8 +58,7 @@ class Subscriptions:
         for topic in self._topics:
             for form in TOPICS[topic].forms:
                 # Codecs are made before the robot drives, not when a detector joins.
-                for definition in definitions(form):
-                    definition.STORE.get_msgdef(definition.ROS)
+                STORE.get_msgdef(form.ROS)
 
     def meet(self, endpoints: Sequence[Endpoint]) -> None:
         """Listen to who publishes, from now on."""
@@ -76,7 +75,7 @@ class Subscriptions:
         for topic, readers in self._readers.items():
             for form, reader in readers.items():
                 if waited := reader.take():
-                    yield topic, TOPICS[topic].form(form.ROS) or form, waited
+                    yield topic, form, waited
 
 
 def forms_published(
@@ -84,8 +83,7 @@ def forms_published(
 ) -> list[type[Message]]:
     """Types in which others publish a topic (key and full name), of those read."""
     published = {end.type for end in endpoints if not end.own and end.writes_to(name)}
-    forms = (form for form in TOPICS[topic].forms if form.ROS in published)
-    return [definition for form in forms for definition in definitions(form)]
+    return [form for form in TOPICS[topic].forms if form.ROS in published]
 
 
 # --- inputs -----------------------------------------------------------------------

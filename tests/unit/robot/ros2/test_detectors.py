@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import fields, replace
 from typing import Any
 
 import pytest
@@ -142,23 +141,6 @@ def test_a_box_in_a_picture_lies_where_the_person_is(
     assert found.class_id == "farmer"
     assert found.probability == pytest.approx(0.9)
     assert math.dist(found.box.centre[:2], TRUTH) <= CLOSE_M
-
-
-@pytest.mark.parametrize("class_id", ["ab", "abc", "abcd", "abcde"])
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_boxes_of_yolox_since_2022_are_read_as_those_before(
-    class_id: str, count: int
-) -> None:
-    """The number at the end of each moves the next one, as the text before it ends."""
-    box = replace(yolox_box(MIDDLE, TALL), class_id=class_id)
-    parts = {one.name: getattr(box, one.name) for one in fields(box)}
-    newer = d.NumberedBoundingBox(**parts, class_id_int=3)
-    seen = d.NumberedBoundingBoxes(OPTICAL, UNSEEN, (newer,) * count)
-
-    found = told("detections_2d", seen, d.BoundingBoxes).detections
-
-    assert [one.class_id for one in found] == [class_id] * count
-    assert all(math.dist(one.box.centre[:2], TRUTH) <= CLOSE_M for one in found)
 
 
 def test_the_picture_that_yolox_looked_at_is_the_one_that_counts() -> None:
