@@ -1,9 +1,7 @@
 """The web side of the server: routes of the present, of the past, and the pages."""
 
 import asyncio
-import os
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from stat import S_ISREG
 
@@ -93,30 +91,8 @@ def _past_routers(dss: Dss, pages: drawing.Pages) -> Iterator[APIRouter]:
     yield routes.service_worker_router()
 
 
-@dataclass(frozen=True, slots=True)
-class _Kept:
-    """A file as it was read.
-
-    Attributes:
-        version: Time of its last change (ns) and size (bytes).
-        headers: Of an answer that holds the whole file.
-    """
-
-    file: str
-    version: tuple[int, int]
-    headers: Headers
-    content: bytes
-
-    def is_current(self) -> bool:
-        """Whether the file has been neither changed nor taken away."""
-        try:
-            return _version(Path(self.file).stat()) == self.version
-        except OSError:
-            return False
-
-
 class KeptFiles(StaticFiles):
-    """Files of a folder from memory; each is read anew when it has changed.
+    """Files of a folder from memory, as the first who asked for each found it.
 
     A page asks for some 200 at once.  Opened in threads for each request, they would
     hold up the loop on which a STOP runs for twice as long.
@@ -124,36 +100,28 @@ class KeptFiles(StaticFiles):
 
     def __init__(self, folder: Path) -> None:
         super().__init__(directory=folder)
-        self._kept: dict[str, _Kept] = {}
+        self._kept: dict[str, Response] = {}
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         """A whole file from memory; any other answer is the framework's own."""
         asked = Headers(scope=scope)
         if scope["method"] != "GET" or "range" in asked:
             return await super().get_response(path, scope)
-        kept = self._kept.get(path)
-        if kept is None or not kept.is_current():
-            kept = await to_thread.run_sync(self._read, path)
+        kept = self._kept.get(path) or await to_thread.run_sync(self._read, path)
         if kept is None:
             return await super().get_response(path, scope)
         self._kept[path] = kept
         if self.is_not_modified(kept.headers, asked):
             return NotModifiedResponse(kept.headers)
-        return Response(kept.content, headers=kept.headers)
+        return Response(kept.body, headers=kept.headers)
 
-    def _read(self, path: str) -> _Kept | None:
-        """None for what is no file, or was just being written."""
+    def _read(self, path: str) -> Response | None:
+        """The answer with a whole file; None for what is no file."""
         try:
             file, found = self.lookup_path(path)
             if found is None or not S_ISREG(found.st_mode):
                 return None
-            content = Path(file).read_bytes()
+            headers = FileResponse(file, stat_result=found).headers
+            return Response(Path(file).read_bytes(), headers=headers)
         except (OSError, ValueError):
             return None
-        headers = FileResponse(file, stat_result=found).headers
-        is_whole = len(content) == found.st_size
-        return _Kept(file, _version(found), headers, content) if is_whole else None
-
-
-def _version(found: os.stat_result) -> tuple[int, int]:
-    return found.st_mtime_ns, found.st_size

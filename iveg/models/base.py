@@ -19,7 +19,7 @@ from pydantic import (
 from iveg.domain.geometry import Twist2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
-from iveg.domain.records import SHOWN_COLUMNS, Column, DecisionRecord, DetectionRecord
+from iveg.domain.records import SHOWN_COLUMNS, Column
 from iveg.domain.stamps import format_stamp
 
 Slots = dict[str, str | bool | int | float | None]
@@ -185,13 +185,6 @@ class Position(Model):
     x: float
     y: float
     z: float
-
-    @classmethod
-    def of_record(cls, record: DecisionRecord | DetectionRecord) -> Self | None:
-        """The place of a row; None where it was not known."""
-        if record.x is None or record.y is None:
-            return None
-        return cls(x=record.x, y=record.y, z=record.z or 0.0)
 
 
 class Area(Model):

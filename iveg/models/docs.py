@@ -23,14 +23,13 @@ from iveg.models.history import (
     Note,
     OdometryRow,
 )
-from iveg.models.people import DetectionRow, KeptDetection
+from iveg.models.people import DetectionRow
 from iveg.models.typescript import TOLD
 
 SHOWN: Final[tuple[type[Model], ...]] = (
     *TOLD,
     AcknowledgedAlerts,
     Day,
-    KeptDetection,
     DetectionRow,
     OdometryRow,
     Measurement,

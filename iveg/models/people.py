@@ -159,56 +159,34 @@ class DetectionBox(Model):
     frame_id: str
 
 
-@row_of(DetectionRecord, "at", "x", "y", "z")
-class KeptDetection(Row):
-    """One box of one detection frame, as it is remembered.
+@row_of(DetectionRecord)
+class DetectionRow(Row):
+    """One detection of the history.
 
-    A [Detection](#detection) of the history. People's places are kept for
-    ``IVEG_KEEP_POSITIONS_DAYS`` ([deployment.md](../deployment.md), "How long the
-    history keeps what"); then ``position`` and ``box`` are null.
+    People's places are kept for ``IVEG_KEEP_POSITIONS_DAYS``
+    ([deployment.md](../deployment.md), "How long the history keeps what"); then ``x``,
+    ``y``, ``z`` and ``box`` are null.
 
     Attributes:
         box: As sent; null where it is no longer kept.
     """
 
-    received_at: Stamp | None = Field(
-        default=None,
-        description=(
-            "When it reached iVeg; null on ``/live``, where its frame has an age."
-        ),
-    )
-    position: Position | None = Field(
-        description="Null in the history, where it is no longer kept."
-    )
     box: Annotated[DetectionBox | None, OR_NONE]
-    peer: str | None = Field(
-        default=None, description="The robot of the fleet that was seen."
-    )
 
 
-@row_of(DetectionRecord)
-class DetectionRow(KeptDetection):
-    """One detection of the history; what a CSV has beside the rest stands here too.
-
-    A [KeptDetection](#keptdetection) with the names of the CSV, whose columns are all
-    here: a script reads either.
-    """
-
-    @classmethod
-    def from_record(cls, record: DetectionRecord) -> Self:
-        """One detection as it is remembered."""
-        position = Position.of_record(record)
-        return cls.from_value(record, received_at=record.at, position=position)
-
-
-class Detection(KeptDetection):
+@row_of(DetectionRecord, "at", "x", "y", "z")
+class Detection(Row):
     """One box of one detection frame, placed in ``map``.
 
     Attributes:
         position: Centre in ``map`` (m).
+        box: As sent.
+        peer: The robot of the fleet that was seen.
     """
 
     position: Position
+    box: DetectionBox
+    peer: str | None
 
     @classmethod
     def of(

@@ -108,7 +108,7 @@ def live_routers(web: WebParts) -> Iterator[Callable[[], APIRouter]]:
     yield partial(goals.router, parts.goals, clock)
     yield partial(alerts.router, evaluator, clock)
     yield partial(rule.router, parts.rules, parts.trials, clock)
-    yield partial(detections.router, evaluator.tracking.newest, web.worker)
+    yield partial(detections.router, evaluator.tracking.newest)
     yield partial(detections.words_router, parts.detectors, parts.things, clock)
     yield partial(latency.router, watch, clock, web.worker)
     yield partial(past.router, web.recordings, web.past, clock)

@@ -145,7 +145,6 @@ export function detection(changes = {}) {
     },
     confident: true,
     person_id: "p1",
-    received_at: null,
     peer: null,
     transport: "direct",
     ...changes,

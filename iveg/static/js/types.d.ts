@@ -289,11 +289,8 @@ export type DecisionLink = {
 
 /** One box of one detection frame, placed in ``map``. */
 export type Detection = {
-  /** When it reached iVeg; null on ``/live``, where its frame has an age. */
-  received_at: string | null;
   position: Position;
-  box: DetectionBox | null;
-  /** The robot of the fleet that was seen. */
+  box: DetectionBox;
   peer: string | null;
   /** The robot. */
   robot_id: string;

@@ -9,8 +9,6 @@ from iveg.models.base import write_json
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
-FEW_ROWS = 200
-"""Rows that cost the loop less than sending them to the worker."""
 
 
 class Json(Response):

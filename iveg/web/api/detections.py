@@ -3,33 +3,32 @@
 They say which detector is in service, what its words stand for, and who is no person.
 """
 
+import asyncio
 from collections.abc import Sequence
 from datetime import timedelta
 from typing import Annotated, Self
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Query, Response
 from pydantic import AfterValidator, Field, model_validator
 
 from iveg.adapters.history.lists import USUAL_ROWS
 from iveg.domain.records import DetectionRecord
 from iveg.domain.wire import legible
 from iveg.domain.words import WordAnswer
-from iveg.models.base import Body, Listing, write_json
+from iveg.models.base import Body, Listing
 from iveg.models.people import DetectionRow, Thing
 from iveg.models.robot import Detector
 from iveg.vital.detections import NewestDetections
 from iveg.vital.operators import Detectors, ThingMarks
 from iveg.vital.ports import Clock
-from iveg.web.api import exports
-from iveg.web.api.answers import FEW_ROWS, Apart, Json
-from iveg.web.api.exports import MEDIA_TYPES, Form
+from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import RowFilters, admitting
 from iveg.web.pages.sentences import in_madrid, start_of
 from iveg.web.security.requirements import READERS, Operator
 
 
-def router(newest: NewestDetections, worker: Apart) -> APIRouter:
-    """Each detection, which the history does not keep; answers are made apart."""
+def router(newest: NewestDetections) -> APIRouter:
+    """Each detection, which the history does not keep; answers are made in a thread."""
     routes = APIRouter(
         prefix="/api/v1",
         tags=["live"],
@@ -39,31 +38,17 @@ def router(newest: NewestDetections, worker: Apart) -> APIRouter:
     @routes.get(
         "/detections/latest",
         response_model=Listing[DetectionRow],
-        responses={200: {"content": {one: {} for one in MEDIA_TYPES.values()}}},
     )
-    async def latest(
-        request: Request, asked: Annotated[RowFilters, Query()]
-    ) -> Response:
+    async def latest(asked: Annotated[RowFilters, Query()]) -> Response:
         """Each detection of the last moments, none left out, newest first."""
-        form = asked.format or exports.form_of(request.headers)
         rows = newest.rows(admitting(asked), asked.limit or USUAL_ROWS)
-        is_few = len(rows) <= FEW_ROWS
-        body = _write(form, rows) if is_few else await worker.run(_write, form, rows)
-        return Response(body, media_type=MEDIA_TYPES[form])
+        return await asyncio.to_thread(_listing, rows)
 
     return routes
 
 
-def _write(form: Form, rows: Sequence[DetectionRecord]) -> bytes:
-    if form == "csv":
-        return exports.csv_head(DetectionRecord) + exports.csv_rows(
-            DetectionRecord, rows
-        )
-    if form == "ndjson":
-        return exports.ndjson_rows(DetectionRow.from_record, ((one,) for one in rows))
-    return write_json(
-        {"items": [DetectionRow.from_record(one) for one in rows], "next": None}
-    )
+def _listing(records: Sequence[DetectionRecord]) -> Json:
+    return Json(Listing(items=[DetectionRow.from_record(one) for one in records]))
 
 
 class ServiceRequest(Body):

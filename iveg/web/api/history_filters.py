@@ -104,7 +104,6 @@ class RowFilters(Range):
     limit: int | None = Field(
         None, ge=1, le=lists.MOST_ROWS, description="Rows of a page; 100 unless told"
     )
-    format: Form | None = Field(None, description="Instead of an `Accept` header")
 
 
 class Filters(RowFilters):
@@ -113,6 +112,7 @@ class Filters(RowFilters):
     cursor: str | None = Field(
         None, max_length=200, description="`next` of the page before"
     )
+    format: Form | None = Field(None, description="Instead of an `Accept` header")
 
 
 def admitting(wanted: RowFilters) -> Callable[[JudgedDetection], bool]:

@@ -5,6 +5,8 @@ import json
 import pytest
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
 
 from iveg.domain.records import AuditRecord
 from iveg.domain.stop import Press
@@ -81,14 +83,18 @@ async def test_a_body_that_cannot_be_read_leaves_a_row_without_it(
 async def test_a_file_that_is_sent_is_an_export_and_reading_leaves_no_row(
     desk: WebDesk,
 ) -> None:
+    def send(_: Request) -> Response:
+        return Response("at\n", media_type="text/csv")
+
+    desk.app.router.routes.append(Route("/api/v1/detections", send))
     async with desk.browser() as page, desk.stranger() as stranger:
         await page.get("/api/v1/robots")
         await stranger.post("/api/v1/robots/AGI/stop")
-        answer = await page.get("/api/v1/detections/latest?format=csv&robot=AGI")
+        answer = await page.get("/api/v1/detections?format=csv&robot=AGI")
 
     row, details = only(desk)
     assert answer.status_code == 200
-    assert (row.action, row.subject) == ("export", "/api/v1/detections/latest")
+    assert (row.action, row.subject) == ("export", "/api/v1/detections")
     assert details == {"query": "format=csv&robot=AGI"}
 
 
