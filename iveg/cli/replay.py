@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Iterable
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -61,7 +60,6 @@ async def replay(options: argparse.Namespace, settings: Settings) -> None:
                 "scan": options.scan_topic,
                 "detections": options.detections_topic,
             },
-            tell=partial(print, flush=True),
         )
 
 
