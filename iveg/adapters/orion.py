@@ -5,7 +5,6 @@ nowhere (docs/fiware.md).  The evidence is the robot's own answer.
 """
 
 from collections.abc import Mapping
-from datetime import datetime
 
 from iveg.adapters.fiware_http import (
     PROBE_TIMEOUT_S,
@@ -103,23 +102,6 @@ class OrionClient(FiwareHttp):
             PROBE_TIMEOUT_S,
         )
 
-    async def modified_at(self, robot_id: str) -> float | None:
-        """When Orion last changed a robot's odometry.
-
-        Returns:
-            Seconds, Unix time; None where there is none yet.
-
-        Raises:
-            HopError: Orion does not answer.
-        """
-        query = {
-            "type": names.ROBOT_TYPE,
-            "attrs": names.ODOMETRY,
-            "metadata": "dateModified",
-            "options": "skipForwarding",
-        }
-        return _date_modified(await self._read_entity(robot_id, query), names.ODOMETRY)
-
     async def delete_attribute(self, robot_id: str, name: str) -> bool:
         """Delete an attribute of a robot; whether there was one.
 
@@ -216,11 +198,3 @@ class OrionClient(FiwareHttp):
         """
         path = f"/v2/subscriptions/{subscription_id}"
         await self.ask("DELETE", path, also=(404,))
-
-
-def _date_modified(entity: Document | None, attribute: str) -> float | None:
-    try:
-        text = (entity or {})[attribute]["metadata"]["dateModified"]["value"]
-        return datetime.fromisoformat(text).timestamp()
-    except (KeyError, TypeError, ValueError):
-        return None

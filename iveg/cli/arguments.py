@@ -126,7 +126,7 @@ def add_replay(replay: argparse.ArgumentParser) -> None:
         help="map that the recordings share, such as `shared` (default: each its own)",
     )
     replay.add_argument(
-        "--force", action="store_true", help="also where a live robot may be listening"
+        "--force", action="store_true", help="also on a broker that is not on loopback"
     )
     add_end(replay)
 

@@ -1,14 +1,10 @@
 """``iveg replay``: recorded logs as robots, whose names no live robot may have."""
 
 import argparse
-from collections.abc import Iterable
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from iveg.adapters import clock
 from iveg.adapters.fleet_files import load_fleet
-from iveg.app.outside import open_fiware
 from iveg.cli.arguments import CommandCall
 from iveg.cli.nodes import broker_of, node_settings
 from iveg.cli.running import LOOPBACK, run_until_stopped
@@ -16,23 +12,6 @@ from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription
 from iveg.robot.replay.replay import ReplaySettings, run_replay
 from iveg.settings import Settings
-
-_LIVE_S = 10.0
-
-
-async def live_robot(settings: Settings, robots: Iterable[str]) -> str | None:
-    """The first of these robots that Orion had data of in the last 10 s.
-
-    Raises:
-        HopError: Orion does not answer.
-    """
-    orion, agent = open_fiware(settings)
-    async with orion, agent:
-        for robot_id in robots:
-            modified = await orion.modified_at(robot_id)
-            if modified is not None and clock.wall() - modified < _LIVE_S:
-                return robot_id
-    return None
 
 
 def run(call: CommandCall) -> int:
@@ -44,7 +23,7 @@ def run(call: CommandCall) -> int:
 async def replay(options: argparse.Namespace, settings: Settings) -> None:
     """Recorded logs of real robots, replayed as robots."""
     fleet = load_fleet(settings.fleet, settings.robots)
-    await _refuse_replay(options, settings, fleet)
+    _refuse_replay(options, settings, fleet)
     with TemporaryDirectory(prefix="iveg-replay-") as directory:
         await run_replay(
             options.files,
@@ -61,11 +40,10 @@ async def replay(options: argparse.Namespace, settings: Settings) -> None:
                 "scan": options.scan_topic,
                 "detections": options.detections_topic,
             },
-            tell=partial(print, flush=True),
         )
 
 
-async def _refuse_replay(
+def _refuse_replay(
     options: argparse.Namespace, settings: Settings, fleet: FleetDescription
 ) -> None:
     """Refuse a replay that could be taken for a live robot."""
@@ -77,15 +55,8 @@ async def _refuse_replay(
         if fleet.of_robot(name).kind == "live":
             reason = f"is a live robot of the fleet; {name}:recording in IVEG_ROBOTS"
             raise DataFileError("--robot", name, f"{reason} makes it a recording")
-    if options.force:
-        return
     host = broker_of(settings).host
-    if host not in LOOPBACK:
+    if host not in LOOPBACK and not options.force:
         raise DataFileError(
             "IVEG_MQTT_URL", host, "is not on loopback; --force if that is meant"
-        )
-    live = await live_robot(settings, options.robot)
-    if live is not None:
-        raise DataFileError(
-            "--robot", live, "was live in the last 10 s; --force if meant"
         )

@@ -11,7 +11,6 @@ from iveg.domain.errors import HopError
 from iveg.domain.kinds import KIND_OF, MEASURED
 from iveg.domain.observations import (
     CommandAnswer,
-    DetectionFrame,
     FeedbackRef,
     GoalAnswer,
     Instant,
@@ -37,10 +36,9 @@ from iveg.robot.holds import HoldSet
 #     camera all             all ──> 3 Hz    3 Hz            3 Hz
 #     poses  all             all             all ──> 5 Hz    5 Hz
 #
-# The level rises while the backlog lasts and falls slowly afterwards; after each fall
-# that was too early the next one waits twice as long. No reported backlog can raise a
-# rate above the sensor's own or lower it below these floors. Safety reports are never
-# fewer. Messages held back still go to iVeg directly.
+# The level rises while the backlog lasts and falls slowly afterwards. No reported
+# backlog can raise a rate above the sensor's own or lower it below these floors. Safety
+# reports are never fewer. Messages held back still go to iVeg directly.
 
 TOP_HZ = 30.0
 FLOOR_HZ = dict(
@@ -56,7 +54,8 @@ BEHIND_S, WELL_S = 0.5, 0.25
 """Lag (s) that counts as a backlog, and as none; between the two the level stays."""
 FAR_BEHIND_S = 3.0
 RISE_PER_S, RISE_FAR_PER_S, SINK_PER_S = 0.5, 1.0, 0.02
-PATIENCE_S, LONGEST_PATIENCE_S = 10.0, 600.0
+PATIENCE_S = 10.0
+"""Time without a backlog before the level falls (s)."""
 _LONGEST_STEP_S = 0.5
 
 
@@ -73,8 +72,6 @@ class UplinkRates:
     level: float = 0.0
     _told_at: float | None = None
     _well_since: float | None = None
-    _patience_s: float = PATIENCE_S
-    _sank: bool = False
     _due: dict[str, float] = field(default_factory=dict)
 
     def note_backlog(self, backlog_s: float | None, now: float) -> None:
@@ -91,26 +88,21 @@ class UplinkRates:
             self._sink(now, step)
 
     def _rise(self, backlog_s: float, step: float) -> None:
-        if self._sank:
-            self._patience_s = min(2.0 * self._patience_s, LONGEST_PATIENCE_S)
-        self._sank, self._well_since = False, None
+        self._well_since = None
         speed = RISE_FAR_PER_S if backlog_s >= FAR_BEHIND_S else RISE_PER_S
         self.level = min(LEVELS, self.level + speed * step)
 
     def _sink(self, now: float, step: float) -> None:
         if self._well_since is None:
             self._well_since = now
-        if self.level == 0.0:
-            self._sank, self._patience_s = False, PATIENCE_S
-        elif now - self._well_since >= self._patience_s:
-            self._sank = True
+        if now - self._well_since >= PATIENCE_S:
             self.level = max(0.0, self.level - SINK_PER_S * step)
 
-    def is_measure(self, suffix: str, now: float, *, news: bool = False) -> bool:
-        """Whether a device's message also goes to the agent; changes always do."""
+    def is_measure(self, suffix: str, now: float) -> bool:
+        """Whether a device's message goes to the agent."""
         interval = self._interval_s(suffix)
         due = self._due.get(suffix, now)
-        if now < due and not news:
+        if now < due:
             return False
         # A late message is compensated, so that the mean rate is kept, not exceeded.
         self._due[suffix] = max(due, now - interval) + interval
@@ -318,25 +310,18 @@ class Uplink:
         self._apikey = apikey
         self._origins = origins
         self._enqueue = enqueue
-        self._looked: tuple[tuple[str, int], ...] = ()
         self.rates = UplinkRates()
 
     def send(self, observation: Observation, at: Instant) -> None:
         """Send an observation of this moment."""
-        news = isinstance(observation, DetectionFrame) and self._is_news(observation)
         suffix = _suffix_of(observation)
         origin = self._origins.next(suffix, at)
         stamped = replace(observation, robot_id=self._id, origin=origin)
         payload = codec.write_measure(stamped)
-        if self.rates.is_measure(suffix, at.mono, news=news):
+        if self.rates.is_measure(suffix, at.mono):
             self._enqueue(self._topic(suffix), payload)
         else:
             self._enqueue(names.direct_topic(self._id, suffix), payload)
-
-    def _is_news(self, frame: DetectionFrame) -> bool:
-        """Whether the detected classes or their level of confidence changed."""
-        before, self._looked = self._looked, _seen(frame)
-        return self._looked != before
 
     def report(
         self, report: SafetyReport, at: Instant, *, is_measure: bool = True
@@ -361,19 +346,6 @@ class Uplink:
 
     def _topic(self, suffix: str) -> str:
         return names.measure_topic(self._apikey, self._id + suffix)
-
-
-def _seen(frame: DetectionFrame) -> tuple[tuple[str, int], ...]:
-    """Classes of a frame with their confidence: below 0.5, below 0.8, above."""
-    return tuple(
-        sorted(
-            (
-                detection.class_id,
-                (detection.probability >= 0.5) + (detection.probability >= 0.8),
-            )
-            for detection in frame.detections
-        )
-    )
 
 
 def _suffix_of(observation: Observation) -> str:

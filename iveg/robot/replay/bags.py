@@ -32,6 +32,7 @@ from iveg.ros2.messages import Message
 
 # --- which topics are read, and as what -----------------------------------------------
 
+_log = logging.getLogger(__name__)
 NamedTopics = Mapping[str, str | None]
 """Topic to read by its role; None, or no role: the only one of its types."""
 _CHOSEN: Mapping[str, tuple[str, Sequence[type[Message]]]] = {
@@ -41,7 +42,6 @@ _CHOSEN: Mapping[str, tuple[str, Sequence[type[Message]]]] = {
 }
 """Option of the command that names the topic of a role, and its types."""
 _FORMS = (ros.TFMessage, *(form for _, forms in _CHOSEN.values() for form in forms))
-_NOT_NEEDED = "ignored: not needed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,6 @@ class BagTopic:
 
     name: str
     type: str
-    count: int
     type_hash: str
 
 
@@ -63,8 +62,10 @@ class Use:
     form: type[Message]
 
 
-class BagPlan:
-    """Use of each topic of a bag.
+def uses_of(
+    path: Path, topics: Sequence[BagTopic], named: NamedTopics
+) -> dict[str, Use]:
+    """Topics of a bag that are read, by name.
 
     Args:
         path: The bag, for complaints.
@@ -74,56 +75,49 @@ class BagPlan:
     Raises:
         DataFileError: its topics leave open which is meant, or none is odometry.
     """
-
-    def __init__(
-        self, path: Path, topics: Sequence[BagTopic], named: NamedTopics
-    ) -> None:
-        self._path, self._topics = path, topics
-        self.read: dict[str, Use] = {}
-        self._fates: dict[BagTopic, str] = {}
-        for role in _CHOSEN:
-            self._choose(role, named.get(role))
-        for topic in topics:
-            if topic.type == ros.TFMessage.ROS:
-                is_static = topic.name.endswith("tf_static")
-                self._use(topic, "tf_static" if is_static else "tf")
-        if not any(use.role == "odometry" for use in self.read.values()):
-            raise _unusable(path, f"holds no topic of type {ros.Odometry.ROS}")
-
-    def table(self) -> list[str]:
-        """One line a topic: name, type, messages, and what becomes of it."""
-        rows = [
-            (each.name, each.type, str(each.count), self._fates.get(each, _NOT_NEEDED))
-            for each in self._topics
-        ]
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
-
-    def _choose(self, role: str, wanted: str | None) -> None:
-        """Read the topic of a role, if there is one.
-
-        Raises:
-            DataFileError: several, or the one that is named is not there.
-        """
-        option, forms = _CHOSEN[role]
-        types = [form.ROS for form in forms]
-        found = [topic for topic in self._topics if topic.type in types]
-        chosen = [topic for topic in found if wanted in (None, topic.name)]
-        if len(chosen) > 1 or (wanted is not None and not chosen):
-            names = ", ".join(sorted({topic.name for topic in found})) or "none"
-            those = f"those of {' or '.join(types)}: {names}"
-            raise _unusable(self._path, f"{option} must name one of {those}")
-        for topic in chosen:
-            self._use(topic, role)
-
-    def _use(self, topic: BagTopic, role: str) -> None:
-        """Read a topic, unless its type has other fields under the same name."""
+    uses: dict[str, Use] = {}
+    for topic, role in _roles(path, topics, named):
         form = next(form for form in _FORMS if topic.type == form.ROS)
         if topic.type_hash in ("", type_hash(form)):
-            self.read[topic.name] = Use(topic, role, form)
-            self._fates[topic] = role
+            uses[topic.name] = Use(topic, role, form)
         else:
-            self._fates[topic] = f"ignored: another definition, {topic.type_hash}"
+            why = "its type is of another definition"
+            _log.warning("%s, %s is not read: %s", path, topic.name, why)
+    if not any(use.role == "odometry" for use in uses.values()):
+        raise _unusable(path, f"holds no topic of type {ros.Odometry.ROS}")
+    return uses
+
+
+def _roles(
+    path: Path, topics: Sequence[BagTopic], named: NamedTopics
+) -> Iterator[tuple[BagTopic, str]]:
+    """Each topic that is needed, and its role."""
+    for role in _CHOSEN:
+        for topic in _chosen(path, topics, role, named.get(role)):
+            yield topic, role
+    for topic in topics:
+        if topic.type == ros.TFMessage.ROS:
+            is_static = topic.name.endswith("tf_static")
+            yield topic, "tf_static" if is_static else "tf"
+
+
+def _chosen(
+    path: Path, topics: Sequence[BagTopic], role: str, wanted: str | None
+) -> Sequence[BagTopic]:
+    """The topic of a role, if there is one.
+
+    Raises:
+        DataFileError: several, or the one that is named is not there.
+    """
+    option, forms = _CHOSEN[role]
+    types = [form.ROS for form in forms]
+    found = [topic for topic in topics if topic.type in types]
+    chosen = [topic for topic in found if wanted in (None, topic.name)]
+    if len(chosen) > 1 or (wanted is not None and not chosen):
+        names = ", ".join(sorted({topic.name for topic in found})) or "none"
+        those = f"those of {' or '.join(types)}: {names}"
+        raise _unusable(path, f"{option} must name one of {those}")
+    return chosen
 
 
 def _unusable(path: Path, reason: str) -> DataFileError:
@@ -136,8 +130,7 @@ def _unusable(path: Path, reason: str) -> DataFileError:
 # One pass over a bag: its messages as observations in ``map``, as on a live robot.
 #
 # What a bag leaves out is stood in for: without ``map`` the root of its odometry is
-# ``map``; without odometry among its transforms the odometry itself leads to the robot;
-# without the frame of its laser the laser sits where the fleet file says.
+# ``map``; without the frame of its laser the laser sits where the fleet file says.
 
 _MAX_AGE_S = 1.0
 """Greatest age of a transform (s); maps are corrected less often in recordings."""
@@ -186,8 +179,6 @@ class BagPass:
         return found
 
     def _odometry(self, message: ros.Odometry, now: float) -> Odometry | None:
-        if self._tree.lacks_base:
-            self._places.add(_link(message), static=False)
         place = self._places.locate(message, now)
         if place is None:
             return None
@@ -219,7 +210,6 @@ class BagTree:
 
     Attributes:
         frames: Names of the robot's frames in the bag.
-        lacks_base: Odometry must stand in for its own transform.
         links: What is known before the first message.
     """
 
@@ -240,7 +230,6 @@ class BagTree:
         if usual.base_link in self._up(base) or base in self._up(usual.base_link):
             base = usual.base_link  # odometry of a footprint
         self.frames = usual.model_copy(update={"odom": odom, "base_link": base})
-        self.lacks_base = not {odom, usual.map} & set(self._up(base))
         self.links = [*static]
         if usual.map not in self._up(odom):
             header = ros.Header(frame_id=usual.map)
@@ -252,18 +241,8 @@ class BagTree:
         return self.frames.base_link in self._up(frame.lstrip("/"))[1:]
 
 
-def _link(odometry: ros.Odometry) -> ros.TFMessage:
-    """Odometry as a transform."""
-    place, turned = odometry.pose.pose.position, odometry.pose.pose.orientation
-    transform = ros.Transform(ros.Vector3(place.x, place.y, place.z), turned)
-    child = odometry.child_frame_id or Frames().base_link
-    link = ros.TransformStamped(odometry.header, child, transform)
-    return ros.TFMessage((link,))
-
-
 # --- bags -------------------------------------------------------------------------
 
-_log = logging.getLogger(__name__)
 _LONGEST_S = 1e7
 _LINKS_AHEAD = 2000
 """Messages of TF that tell, before the first pass, which frames there are."""
@@ -283,7 +262,7 @@ class Bag:
 
     def __init__(self, path: Path, named: NamedTopics, mount: Pose2D) -> None:
         self._path, self._mount = path, mount
-        self.plan = BagPlan(path, _topics_of(path), named)
+        self._uses = uses_of(path, _topics_of(path), named)
         self._reported: set[str] = set()
         static = [*self._messages("tf_static")]
         moving = [*islice(self._messages("tf"), _LINKS_AHEAD)]
@@ -302,7 +281,7 @@ class Bag:
         Raises:
             DataFileError: the recording breaks off.
         """
-        this = BagPass(self.plan.read, self._tree, self._mount)
+        this = BagPass(self._uses, self._tree, self._mount)
         start: float | None = None
         for use, logged_s, payload in self._records():
             try:
@@ -322,7 +301,7 @@ class Bag:
         """Messages with these roles, or all that are read; when written (Unix s)."""
         uses = {
             (name, use.topic.type): use
-            for name, use in self.plan.read.items()
+            for name, use in self._uses.items()
             if not roles or use.role in roles
         }
         with _open(self._path) as reader:
@@ -356,16 +335,16 @@ class Bag:
 
 def _topics_of(path: Path) -> list[BagTopic]:
     """Topics of a bag by name; several recorded connections of one are joined."""
-    counts: dict[tuple[str, str, str], int] = {}
     with _open(path) as reader:
-        for found in reader.connections:
-            digest = found.digest if found.digest.startswith("RIHS01_") else ""
-            key = found.topic, found.msgtype, digest
-            counts[key] = counts.get(key, 0) + found.msgcount
-    return [
-        BagTopic(name, kind, counts[name, kind, digest], digest)
-        for name, kind, digest in sorted(counts)
-    ]
+        found = {
+            (source.topic, source.msgtype, _type_hash_in(source.digest))
+            for source in reader.connections
+        }
+    return [BagTopic(*each) for each in sorted(found)]
+
+
+def _type_hash_in(digest: str) -> str:
+    return digest if digest.startswith("RIHS01_") else ""
 
 
 @contextmanager

@@ -141,7 +141,6 @@ def open_recording(
     path: Path,
     mount: Pose2D,
     named: NamedTopics = AS_RECORDED,
-    tell: Callable[[str], None] | None = None,
 ) -> Recording:
     """Open a recording by its file name.
 
@@ -150,38 +149,30 @@ def open_recording(
             of iVeg's own recordings also ``FILE.mcap#ROBOT``.
         mount: Pose of a bag's laser in ``base_link``; logs contain it.
         named: Topics of a bag that are named.
-        tell: Takes a line for each topic of a bag: what becomes of it.
 
     Raises:
         DataFileError: unknown format, unreadable file, or no odometry.
     """
-    recording, table = _opened(path, mount, named)
-    if tell is not None:
-        for line in table:
-            tell(line)
+    recording = _opened(path, mount, named)
     if not any(isinstance(entry.observation, Odometry) for entry in recording()):
         raise DataFileError(str(path), "", "holds no odometry that can be used.")
     return recording
 
 
-def _opened(
-    path: Path, mount: Pose2D, named: NamedTopics
-) -> tuple[Recording, Sequence[str]]:
-    """The recording, and the table of a bag's topics."""
+def _opened(path: Path, mount: Pose2D, named: NamedTopics) -> Recording:
     stem, _, robot_id = str(path).partition(".mcap#")
     own = Path(f"{stem}.mcap") if robot_id else path
     if own.suffix == ".mcap" and is_own(own):
-        return OwnRecording(own, robot_id or None).entries, ()
+        return OwnRecording(own, robot_id or None).entries
     if robot_id and own.is_file():
         reason = (
             "is no recording of iVeg's that can be read, so # names no robot in it."
         )
         raise DataFileError(str(own), "", reason)
     if path.is_dir() or path.suffix in _BAGS:
-        opened = Bag(path, named, mount)
-        return opened.entries, (f"{path}:", *opened.plan.table())
+        return Bag(path, named, mount).entries
     if path.suffix in _LOGS:
-        return LogReader(path).entries, ()
+        return LogReader(path).entries
     known = ", ".join((*_LOGS[:1], ".jsonl.gz", *_BAGS))
     reason = f"is none of {known}, and no directory of a bag."
     raise DataFileError(str(path), "", reason)
@@ -224,7 +215,6 @@ async def run_replay(
     *,
     named: NamedTopics = AS_RECORDED,
     fleet: FleetDescription = NOBODY,
-    tell: Callable[[str], None] | None = None,
 ) -> None:
     """Play recordings; returns when all have ended, never with ``loop``.
 
@@ -235,7 +225,6 @@ async def run_replay(
             missing.
         named: Topics of ROS bags that are named.
         fleet: Fleet description.
-        tell: Takes a line for each topic of a bag: what becomes of it.
 
     Raises:
         DataFileError: files and robots do not match, or a file cannot be used.
@@ -244,7 +233,7 @@ async def run_replay(
     replayed = []
     for file, robot_id in zip(files, robots, strict=True):
         profile = fleet.of_robot(robot_id).profile
-        recording = open_recording(file, profile.laser, named, tell)
+        recording = open_recording(file, profile.laser, named)
         playback = Playback(recording, loop=settings.loop)
         replayed.append(ReplayedRobot(robot_id, profile, playback, settings))
     try:

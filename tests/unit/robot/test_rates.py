@@ -69,14 +69,3 @@ def test_a_backlog_is_answered_within_seconds_and_forgiven_slowly() -> None:
     assert 1.5 < rates.level < 2.5
     told_for(rates, 0.1, 200.0, now)
     assert rates.level == 0.0
-
-
-def test_each_time_that_it_was_too_early_it_waits_longer() -> None:
-    rates, now, waits = UplinkRates(), 0.0, []
-    for _ in range(4):
-        now = told_for(rates, 5.0, 4.0, now)
-        began = now
-        while rates.level == LEVELS:
-            now = told_for(rates, 0.0, 0.2, now)
-        waits.append(round((now - began) / PATIENCE_S))
-    assert waits == [1, 2, 4, 8]

@@ -12,7 +12,6 @@ import pytest
 from iveg.domain.errors import HopError
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import (
-    Detection,
     DetectionFrame,
     FeedbackRef,
     Hold,
@@ -236,34 +235,6 @@ def test_what_the_agent_is_spared_goes_straight_to_iveg_in_the_same_count() -> N
     read = [codec.read_measure("AGI_odom", raw).observations for _, raw in wire.sent]
     counted = [one.origin.seq for (one,) in read if isinstance(one, Odometry)]
     assert counted == list(range(1, 31))
-
-
-@pytest.mark.parametrize(
-    "seen",
-    [
-        (),
-        (detection("farmer", 2.0), detection("farmer", 8.0)),
-        (detection("robot", 2.0),),
-        (detection("farmer", 2.0, probability=0.6),),
-    ],
-    ids=["nobody", "one more", "another class", "less sure"],
-)
-def test_a_look_that_sees_others_goes_through_the_agent_at_once(
-    seen: tuple[Detection, ...],
-) -> None:
-    wire = Wire()
-    wire.uplink.rates.level = LEVELS
-    before = detection_frame("AGI", detection("farmer", 2.0), origin=BLANK)
-    wire.uplink.send(before, Instant(0.0, START.wall))
-    wire.uplink.send(before, Instant(0.03, START.wall))
-    wire.uplink.send(
-        detection_frame("AGI", *seen, origin=BLANK), Instant(0.06, START.wall)
-    )
-    assert [topic for topic, _ in wire.sent] == [
-        "/iveg/AGI_yolox_bounding_boxes/attrs",
-        "/AGI/iveg/yolox_bounding_boxes",
-        "/iveg/AGI_yolox_bounding_boxes/attrs",
-    ]
 
 
 @pytest.mark.parametrize(
