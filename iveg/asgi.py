@@ -66,7 +66,6 @@ def _past_routers(dss: Dss, pages: drawing.Pages) -> Iterator[APIRouter]:
     yield history.router(
         queries,
         worker,
-        threshold=lambda: evaluator.rule.threshold.every,
         present=evaluator.decision_record,
         alerts=views.alerts,
         fleet=dss.fleet,

@@ -6,11 +6,13 @@ from pydantic import Field
 
 from iveg.domain.equipment import Limit, State, TileStatus
 from iveg.domain.equipment import Tile as DomainTile
+from iveg.domain.events import Language
 from iveg.domain.observations import Climate as DomainClimate
 from iveg.domain.observations import Instant
 from iveg.models.base import (
     GreenhouseMap,
     Model,
+    Point,
     Scan,
     Stamp,
     Thousandth,
@@ -23,22 +25,17 @@ from iveg.models.robot import Robot
 from iveg.models.rule import Rule
 
 
-class Air(Model):
-    """Measured climate; null where a sensor is silent."""
-
-    temperature: float | None = Field(description="°C.")
-    relative_humidity: float | None = Field(description="0 to 1.")
-    co2: float | None = Field(description="ppm.")
-
-
-class Climate(Air):
-    """The newest reading.
+class Climate(Model):
+    """The newest reading of the air; null where a sensor is silent.
 
     Attributes:
         received_at: When iVeg took it.
         age_s: Since then (s).
     """
 
+    temperature: float | None = Field(description="°C.")
+    relative_humidity: float | None = Field(description="0 to 1.")
+    co2: float | None = Field(description="ppm.")
     received_at: Stamp
     age_s: Thousandth
 
@@ -50,37 +47,13 @@ class Climate(Air):
         )
 
 
-class TileName(Model):
-    """Name of a tile, by language.
-
-    Attributes:
-        es: By language.
-        en: By language.
-    """
-
-    es: str
-    en: str
-
-
-class TilePlace(Model):
-    """Where its mark stands in ``map`` (m).
-
-    Attributes:
-        x: In ``map`` (m).
-        y: In ``map`` (m).
-    """
-
-    x: float
-    y: float
-
-
 class Tile(Model):
     """One attribute of one entity, with its newest number.
 
     Attributes:
         entity_id: The entity at Orion.
         attribute: Its attribute.
-        name: What people call it.
+        name: What people call it, by language.
         unit: Of ``value`` and ``limits``; ``1``: none.
         decimals: That people are shown.
         limits: ``low_low``, ``low``, ``high``, ``high_high``, those that it has (its
@@ -95,7 +68,7 @@ class Tile(Model):
     key: str = Field(description="Entity and attribute.")
     entity_id: str
     attribute: str
-    name: TileName
+    name: dict[Language, str]
     unit: str
     decimals: int
     limits: dict[Limit, float]
@@ -104,7 +77,7 @@ class Tile(Model):
     received_at: Stamp | None
     age_s: Thousandth | None
     trend: bool
-    place: TilePlace | None
+    place: Point | None
 
     @classmethod
     def of(
@@ -114,13 +87,12 @@ class Tile(Model):
         received, place = status.received, tile.place
         return cls.from_value(
             tile,
-            name=TileName(**tile.name),
             state=state,
             value=status.value,
             received_at=received,
             age_s=None if received is None else now.mono - received.mono,
             trend=tile.has_trend,
-            place=None if place is None else TilePlace(x=place[0], y=place[1]),
+            place=None if place is None else Point(x=place[0], y=place[1]),
         )
 
 

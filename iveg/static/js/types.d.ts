@@ -89,7 +89,7 @@ export type Battery = {
   voltage: number | null;
 };
 
-/** The newest reading. */
+/** The newest reading of the air; null where a sensor is silent. */
 export type Climate = {
   /** °C. */
   temperature: number | null;
@@ -901,7 +901,7 @@ export type Tile = {
   key: string;
   entity_id: string;
   attribute: string;
-  name: TileName;
+  name: Record<string, string>;
   unit: string;
   decimals: number;
   limits: Record<string, number>;
@@ -911,19 +911,7 @@ export type Tile = {
   received_at: string | null;
   age_s: number | null;
   trend: boolean;
-  place: TilePlace | null;
-};
-
-/** Name of a tile, by language. */
-export type TileName = {
-  es: string;
-  en: string;
-};
-
-/** Where its mark stands in ``map`` (m). */
-export type TilePlace = {
-  x: number;
-  y: number;
+  place: Point | null;
 };
 
 /** A candidate that runs beside the rule in force and acts on nothing. */

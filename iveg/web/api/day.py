@@ -20,7 +20,6 @@ from iveg.adapters.history.series import (
     AIR,
     EQUIPMENT,
     SPEEDS,
-    confidence_counts,
     newest_stops,
     people_seen,
     poses_of,
@@ -64,7 +63,6 @@ def add_routes(
     routes: APIRouter,
     queries: Queries,
     worker: Apart,
-    threshold: Callable[[], float | None],
     fleet: FleetDescription,
     read_clock: Clock,
 ) -> None:
@@ -82,19 +80,13 @@ def add_routes(
     @routes.get(
         "/api/v1/history/charts",
         summary="Plotly figures of a range",
-        description="Speed with the speed limit, detections by class and "
-        "confidence, how long each STOP took; the last 15 minutes unless told.",
+        description="Speed with the speed limit; the last 15 minutes unless told.",
         **_FIGURES,
     )
     async def charted(asked: Annotated[Range, Query()]) -> Response:
         since, until = range_of(asked, read_clock().wall)
-        found = await asyncio.gather(
-            queries.ask(series_of, SPEEDS, since, until, asked.robot),
-            queries.ask(confidence_counts, since, until, asked.robot),
-            queries.ask(newest_stops, since, until, asked.robot),
-        )
-        draw = charts.history_figures
-        return await figures(draw, since, until, *found, threshold(), fleet)
+        found = await queries.ask(series_of, SPEEDS, since, until, asked.robot)
+        return await figures(charts.history_figures, since, until, found, fleet)
 
     @routes.get(
         "/api/v1/history/climate",

@@ -143,7 +143,6 @@ def router(
     queries: Queries,
     worker: Apart,
     *,
-    threshold: Callable[[], float | None] = lambda: None,
     present: Callable[[str], DecisionRecord | None] = lambda _: None,
     alerts: Callable[[], list[Alert]] = list,
     fleet: FleetDescription = NOBODY,
@@ -154,7 +153,6 @@ def router(
     Args:
         queries: Reading side of the history.
         worker: Writes files and draws figures.
-        threshold: Least confidence of the rule in force, marked in the chart.
         present: A decision that is still in memory; its links are those of now.
         alerts: Those of now.
         fleet: Robots, whose greatest speeds a chart shows.
@@ -180,7 +178,7 @@ def router(
             raise HTTPException(404, "There is no such decision.")
         return Json(Decision.from_record(found))
 
-    day.add_routes(routes, queries, worker, threshold, fleet, read_clock)
+    day.add_routes(routes, queries, worker, fleet, read_clock)
     return routes
 
 

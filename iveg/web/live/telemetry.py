@@ -97,26 +97,19 @@ class TelemetryEncoder:
         self._moves[robot_id] = odometry, part
         return part
 
-    def state(
-        self, robot_id: str, since: int, now: Instant, young_s: float = 0.0
-    ) -> Part | None:
-        """Other members of a robot that have changed since a version; None for none.
-
-        A state that was encoded less than ``young_s`` ago is not encoded anew.
-        """
+    def state(self, robot_id: str, since: int, now: Instant) -> Part | None:
+        """Other members of a robot that have changed since a version; None for none."""
         topic = topics.ROBOT.of(robot_id)
         state = self._states.setdefault(robot_id, _RobotState())
-        is_young = now.mono - state.at < young_s
-        if state.version != self._hub.versions[topic] and not is_young:
+        if state.version != self._hub.versions[topic]:
             robot = self._views.robot(robot_id, now, self._margins_at(now))
             state.update(robot, self._hub.versions[topic], now.mono)
         return state.changes(topic, since)
 
-    def people(self, since: int, now: Instant, young_s: float = 0.0) -> Part | None:
+    def people(self, since: int, now: Instant) -> Part | None:
         """The list of people, and changes since a version; None without a change."""
         version = self._hub.versions[topics.PEOPLE.name]
-        is_young = now.mono - self._people.at < young_s
-        if self._people.version != version and not is_young:
+        if self._people.version != version:
             people = self._views.people(now)
             self._people.update(people, version, now.mono)
         return self._people.changes(since)

@@ -6,7 +6,6 @@ dependency is for").  ``meta`` names what a trace or an axis shows, and the page
 the words in the reader's language.
 """
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from typing import Final
@@ -14,18 +13,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.adapters.history.series import CONFIDENCE_BINS, Series
+from iveg.adapters.history.series import Series
 from iveg.domain.feedback import FULL_SPEED
 from iveg.domain.fleet import FleetDescription, as_counted
 from iveg.domain.latency import DATA, Cell, Segment, Sketch
-from iveg.domain.records import CommandRecord
-from iveg.domain.transports import TRANSPORTS
 
 Trace = Mapping[str, object]
 Values = Sequence[float | None]
 Lines = Mapping[tuple[str, ...], Series]
 
-_BIN = 1.0 / CONFIDENCE_BINS
 _SILENCE_S = 5.0
 _AIR_SILENCE_S = 300.0
 _STEPS: Final[tuple[Segment, ...]] = ("uplink", "fiware", "iveg", "screen")
@@ -71,53 +67,7 @@ def _times(moments: Iterable[float]) -> list[float]:
     return [round(1000.0 * moment, 1) for moment in moments]
 
 
-# --- counts and latencies ---------------------------------------------------------
-
-
-def confidence_figure(
-    counts: Mapping[str, Counter[int]], threshold: float | None
-) -> bytes:
-    """Detections stacked by class over their confidence, the threshold marked."""
-    traces = [
-        {
-            "type": "bar",
-            "name": class_id,
-            "meta": {"kind": "class", "class_id": class_id},
-            "x": [round((number + 0.5) * _BIN, 4) for number in sorted(bins)],
-            "y": [bins[number] for number in sorted(bins)],
-            "width": 0.9 * _BIN,
-        }
-        for class_id, bins in sorted(counts.items())
-    ]
-    layout: dict[str, object] = {"barmode": "stack", "xaxis": {"range": [0, 1]}}
-    if threshold is not None:
-        ends = {"x0": threshold, "x1": threshold, "y0": 0, "y1": 1}
-        line = {"type": "line", "name": "threshold", "yref": "paper", **ends}
-        layout["shapes"] = [line]
-    return figure_of(traces, ("confidence", "count"), layout)
-
-
-def stop_figure(stops: Sequence[CommandRecord]) -> bytes:
-    """Times of each STOP (ms): to each transport's answer, and to standing."""
-    kinds: dict[str, list[float | None]] = {
-        transport.id: [one.answer_ms.get(transport.id) for one in stops]
-        for transport in TRANSPORTS
-    }
-    kinds["standstill"] = [one.standstill_ms for one in stops]
-    traces = [
-        {
-            "type": "scatter",
-            "mode": "markers",
-            "name": kind,
-            "meta": {"kind": kind},
-            "x": _times(one.requested_at for one in stops),
-            "y": took,
-            "text": [one.robot_id for one in stops],
-        }
-        for kind, took in kinds.items()
-        if any(one is not None for one in took)
-    ]
-    return figure_of(traces, ("time", "took"), {"yaxis": {"rangemode": "tozero"}})
+# --- latencies ---------------------------------------------------------
 
 
 def cdf_figure(sketches: Mapping[Cell, Sketch]) -> bytes:
@@ -139,20 +89,10 @@ def cdf_figure(sketches: Mapping[Cell, Sketch]) -> bytes:
 # --- over time --------------------------------------------------------------------
 
 
-def history_figures(
-    speeds: Lines,
-    counts: Mapping[str, Counter[int]],
-    stops: Sequence[CommandRecord],
-    threshold: float | None,
-    fleet: FleetDescription,
-) -> dict[str, bytes]:
+def history_figures(speeds: Lines, fleet: FleetDescription) -> dict[str, bytes]:
     """The figures of a range by name, one of speed for each robot: R2 before R10."""
     robots = sorted((robot for (robot,) in speeds), key=as_counted)
-    return {
-        **{f"speed/{one}": speed_figure(one, speeds[one,], fleet) for one in robots},
-        "detections": confidence_figure(counts, threshold),
-        "stops": stop_figure(stops),
-    }
+    return {f"speed/{one}": speed_figure(one, speeds[one,], fleet) for one in robots}
 
 
 def speed_figure(robot: str, series: Series, fleet: FleetDescription) -> bytes:

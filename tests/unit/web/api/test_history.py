@@ -24,7 +24,6 @@ from tests.fakes.records import (
     NOON,
     alert_record,
     climate_record,
-    command_record,
     decision_record,
     detection_record,
     log_record,
@@ -52,7 +51,6 @@ class Past:
             router(
                 self.queries,
                 FakeWorker(),
-                threshold=lambda: 0.8,
                 alerts=lambda: self.alerts,
                 read_clock=lambda: Instant(0.0, NOON + 60.0),
             )
@@ -192,8 +190,6 @@ async def test_charts_show_the_last_quarter_of_an_hour(
         odometry_record(at=NOON, linear=0.9),
         odometry_record(at=NOON + 1, linear=0.4, limit_factor=0.5),
         odometry_record(at=NOON + 31, linear=0.0, limit_factor=0.5),
-        detection_record(probability=0.81),
-        command_record(standstill_ms=412.0),
     )
 
     figures = (await client.get("/api/v1/history/charts")).json()["figures"]
@@ -204,11 +200,6 @@ async def test_charts_show_the_last_quarter_of_an_hour(
     assert speed["x"][0] == 1000.0 * NOON
     assert limit["y"] == [1.0, 0.5, None, 0.5]
     assert limit["line"]["shape"] == "hv"
-    [farmer] = figures["detections"]["data"]
-    assert (farmer["name"], farmer["x"], farmer["y"]) == ("farmer", [0.825], [1])
-    assert figures["detections"]["layout"]["shapes"][0]["x0"] == 0.8
-    [standing] = figures["stops"]["data"]
-    assert (standing["name"], standing["y"]) == ("standstill", [412.0])
 
 
 async def test_the_air_of_a_day_is_drawn_with_its_gaps(

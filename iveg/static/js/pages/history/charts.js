@@ -10,7 +10,6 @@
  *   y: (number | null)[], meta: Record<string, any>, yaxis?: string, line?: object,
  *   marker?: object}} Trace
  * @typedef {{data: Trace[], layout: Record<string, any>}} Figure
- * @typedef {"speed" | "detections" | "stops"} ChartName
  * @typedef {Record<string, Figure>} Charts by name; `speed/{robot}` for each robot
  * @typedef {{since: number, until: number}} Span Unix milliseconds
  */
@@ -21,8 +20,6 @@ import { wallText } from "./local_time.js";
 import { fitPaper } from "./paper.js";
 import { keepInStep, placesIn } from "./strips.js";
 
-/** @type {readonly ChartName[]} */
-export const CHARTS = ["speed", "detections", "stops"];
 const CONFIG = { displayModeBar: false, responsive: true, displaylogo: false };
 /** Numbers only: month names would be in the library's language. */
 const TICKS = [
@@ -30,13 +27,7 @@ const TICKS = [
   { dtickrange: [60_000, 86_400_000], value: "%H:%M\n%d/%m" },
   { dtickrange: [86_400_000, null], value: "%d/%m/%y" },
 ];
-const PEOPLE = new Set(["person", "farmer", "human", "operator"]);
 const AIR = new Set(["temperature", "humidity", "co2", "measurement"]);
-const SYMBOLS = {
-  direct: "circle",
-  fiware: "diamond",
-  standstill: "square",
-};
 
 const LIBRARY = "/static/vendor/plotly-basic.min.js";
 /** Of the sheets that the library would make itself (tests/unit/web/pages/test_charts.py). */
@@ -58,18 +49,10 @@ let library = null;
  */
 export async function drawCharts(charts, asked, i18n) {
   const strips = stripsOf(charts);
-  for (const name of CHARTS) {
-    const figures = name === "speed" ? strips : [charts[name]];
-    const data = figures.flatMap((figure) => figure.data);
-    setText(need(`#chart-${name}-note`), noteOf(name, data, i18n));
-    setHidden(need(`#chart-${name}`), data.length === 0);
-    setHidden(need(`#chart-${name}-empty`), data.length > 0);
-  }
-  // The library's first drawing costs as much again as a small figure.
-  for (const name of /** @type {const} */ (["stops", "detections"])) {
-    if (charts[name].data.length === 0) continue;
-    await drawFigure(need(`#chart-${name}`), charts[name], asked, i18n);
-  }
+  const data = strips.flatMap((figure) => figure.data);
+  setText(need("#chart-speed-note"), noteOf(data, i18n));
+  setHidden(need("#chart-speed"), data.length === 0);
+  setHidden(need("#chart-speed-empty"), data.length > 0);
   if (strips.length) await drawStrips(strips, asked, i18n);
 }
 
@@ -163,41 +146,33 @@ async function warmUp(plotly) {
  * @param {import("../../core/i18n.js").I18n} i18n
  */
 function dressed(trace, index, i18n) {
-  const { kind, robot, class_id } = trace.meta;
+  const { kind, robot } = trace.meta;
   const colour = colourOf(trace.meta, index);
-  const name = class_id
-    ? i18n.t("history.trace.class", { class: class_id })
-    : i18n.t(`history.trace.${kind}`, { robot });
-  if (trace.type === "bar") return { ...trace, name, marker: { color: colour } };
+  const name = i18n.t(`history.trace.${kind}`, { robot });
   const isPlain = trace.meta.is_plain === true;
   const x = isPlain
     ? trace.x
     : trace.x.map((at) => (at === null ? null : wallText(at)));
   const line = { ...trace.line, color: colour, width: 2 };
   if (kind === "mandated") Object.assign(line, { width: 1.5, dash: "6px,3px" });
-  const symbol = SYMBOLS[/** @type {keyof typeof SYMBOLS} */ (kind)];
-  const marker = { size: 9, symbol, ...trace.marker, color: colour };
+  const marker = { size: 9, ...trace.marker, color: colour };
   // The newest point lies on the edge, and would be cut in half there.
   return { ...trace, x, name, line, marker, cliponaxis: false };
 }
 
 /**
- * Robots and people keep the colour that they have on the map; alert colours stay with
- * alerts.
+ * Robots keep the colour that they have on the map; alert colours stay with alerts.
  *
  * @param {Trace["meta"]} meta @param {number} index
  */
-function colourOf({ kind, robot, class_id }, index) {
-  const who = robot ?? class_id;
+function colourOf({ kind, robot }, index) {
   const slots = all("[data-robot][data-slot]");
-  const slot = slots.find((chip) => chip.dataset.robot === who)?.dataset.slot;
+  const slot = slots.find((chip) => chip.dataset.robot === robot)?.dataset.slot;
   if (slot) return token(`--robot-${slot}`);
   // One that is no longer in the fleet has one colour for all of its lines.
   if (robot) return token("--text-2");
-  if (PEOPLE.has(String(who))) return token("--person");
   if (AIR.has(kind)) return token("--text-2");
-  if (kind === "class") return token(`--robot-${((index + 3) % 6) + 3}`);
-  return token(kind === "standstill" ? "--text" : `--robot-${index + 3}`);
+  return token(`--robot-${index + 3}`);
 }
 
 /**
@@ -230,13 +205,12 @@ export function styled(layout, asked, i18n) {
         }
       : {}),
   });
-  const line = { color: token("--text"), width: 2, dash: "dot" };
-  const { showlegend = true } = layout;
+  const { showlegend = true, shapes = [] } = layout;
   return {
     ...layout,
     xaxis: axis("x"),
     yaxis: { ...axis("y"), ...layout.yaxis },
-    shapes: shapesOf(layout.shapes ?? [], line),
+    shapes: shapes.length ? [shaded(shapes)] : [],
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: token("--font"), size: 12, color: token("--text-2") },
@@ -248,14 +222,6 @@ export function styled(layout, asked, i18n) {
     hovermode: "closest",
     autosize: true,
   };
-}
-
-/** @param {Record<string, any>[]} shapes @param {object} line of those that are no time */
-function shapesOf(shapes, line) {
-  const slow = shapes.filter(({ name }) => name === "slow");
-  const others = shapes.filter(({ name }) => name !== "slow");
-  const lines = others.map((shape) => ({ ...shape, line }));
-  return slow.length ? [shaded(slow), ...lines] : lines;
 }
 
 /**
@@ -276,25 +242,16 @@ function shaded(times) {
 const at = (ms) => wallText(ms).replace("T", "_");
 
 /**
- * A figure in one sentence, which is its text alternative, too.
+ * The figure of speeds in one sentence, which is its text alternative, too.
  *
- * @param {ChartName} name @param {Trace[]} data
+ * @param {Trace[]} data
  * @param {import("../../core/i18n.js").I18n} i18n
  */
-function noteOf(name, data, i18n) {
+function noteOf(data, i18n) {
   if (data.length === 0) return "";
-  if (name === "speed") {
-    const seconds = Math.max(...data.map((trace) => trace.meta.slice_s));
-    const drawn = seconds > 0 ? "history.note.sliced" : "history.note.exact";
-    return i18n.t(drawn, { seconds });
-  }
-  const sum = (/** @type {Trace} */ trace) =>
-    trace.y.reduce((/** @type {number} */ total, n) => total + (n ?? 0), 0);
-  const count =
-    name === "stops"
-      ? data[0].x.length
-      : data.reduce((total, trace) => total + sum(trace), 0);
-  return i18n.t(`history.note.${name}`, { count });
+  const seconds = Math.max(...data.map((trace) => trace.meta.slice_s));
+  const drawn = seconds > 0 ? "history.note.sliced" : "history.note.exact";
+  return i18n.t(drawn, { seconds });
 }
 
 /** @param {string} name */
