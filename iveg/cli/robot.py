@@ -3,7 +3,6 @@
 import asyncio
 from collections import Counter
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from iveg.adapters import clock
 from iveg.adapters.dds_network import DdsNetwork
@@ -33,9 +32,6 @@ from iveg.robot.ros2.rig import Ros2Robot
 from iveg.ros2 import cdr
 from iveg.ros2.messages import Message
 from iveg.settings import Settings
-
-if TYPE_CHECKING:
-    pass
 
 _CHECK_S = 4.0
 _CHECK_DEPTH = 200

@@ -160,7 +160,6 @@ class SafetyLane:
         self._reports: dict[str, LaneMessage] = {}
         self._keep_wake, self._send_wake = asyncio.Event(), asyncio.Event()
         self._room = asyncio.Semaphore(_UNDER_WAY)
-        self._disk_fails = False
 
     def persist(self, holds: HoldSet) -> None:
         """Store this set; only the newest is pending, since it replaces all before."""
@@ -196,13 +195,7 @@ class SafetyLane:
         try:
             self._keep(holds)
         except OSError as error:
-            if not self._disk_fails:
-                _log.warning("the hold file cannot be written: %s", error)
-            self._disk_fails = True
-        else:
-            if self._disk_fails:
-                _log.warning("the hold file can be written again")
-            self._disk_fails = False
+            _log.warning("the hold file cannot be written: %s", error)
 
     async def send_forever(self) -> None:
         """Publish answers, then the newest report, until cancelled."""
