@@ -33,7 +33,26 @@ def zones(scene: Scene, observer: str) -> set[tuple[float, float, float]]:
 
 
 @given(st.lists(_STEP, max_size=25))
+# A faint look joins a track that another robot's laser began.
+@example(
+    [
+        (0.1, [], [(1.5, 0.85)], None),
+        *_EMPTY[:4],
+        (0.1, [], [], (3.3, True)),
+        (0.1, [(1.5, 0.85), (3.3, 0.85)], [], None),
+        (0.1, [(3.3, 0.3)], [], None),
+        (0.1, [(2.4, 0.85)], [], None),
+    ]
+)
 @example(_WALKER + _EMPTY)
+# Two are equally near, and another robot knew the second first.
+@example(
+    [
+        (0.1, [], [(1.5, 0.85)], None),
+        (0.1, [(3.3, 0.85), (1.5, 0.85)], [], None),
+        (0.1, [(2.4, 0.85)], [], None),
+    ]
+)
 @example([*_WALKER, *((0.1, [], [], (3.3, moved)) for moved in (False, True) * 12)])
 def test_another_observer_ends_no_zone_of_somebody_else_and_makes_nobody_faster(
     run: list[Step],

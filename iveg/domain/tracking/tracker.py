@@ -183,17 +183,6 @@ def _distance(one: Sighting, other: Sighting) -> float:
     return math.hypot(one.x - other.x, one.y - other.y)
 
 
-def _is_replaced(earlier: Sighting, sighting: Sighting, at: Instant) -> bool:
-    """Whether a box shows where somebody is who counted by the observer's looks."""
-    return (
-        earlier.possible
-        and not sighting.possible
-        and earlier.observer == sighting.observer
-        and not (earlier.reach_m or sighting.reach_m)
-        and math.isfinite(_gated(earlier, sighting, at))
-    )
-
-
 # --- tracks -----------------------------------------------------------------------
 
 MAX_PEOPLE, MAX_POSSIBLE, MAX_WALKERS = 256, 64, 8
@@ -259,6 +248,8 @@ class Tracker:
             and earlier.observer == picture[0].sighting.observer
             and earlier.age_s(at) <= LIMITS.zone_lasts_s
         ]
+        # Of two that are equally near the older goes on, whatever other robots saw.
+        own.sort(key=lambda pair: pair[1].chain)
         chains: dict[int, _Chain] = {}
         for is_live in (True, False):
             wanting = _without(picture, chains)
@@ -324,7 +315,6 @@ class Tracker:
             earlier
             for earlier in person.sightings
             if earlier.age_s(at) <= LIMITS.zone_lasts_s
-            and not _is_replaced(earlier, sighting, at)
         )
         # Where a camera sees somebody, what a laser sees there says no more of them.
         is_beside = sighting.laser and not person.newest.laser

@@ -121,7 +121,7 @@ async def test_a_change_of_the_console_waits_until_the_server_drops_it(
     console.leave(change)
     console.leave(revoked)
     console.close()
-    path.with_name("accounts.jsonl.left-0").write_bytes(b"junk")
+    path.with_name("accounts.jsonl.left-junk").write_bytes(b"junk")
 
     left = file.left()
     await file.drop([path for path, _ in left])
