@@ -191,12 +191,6 @@ class CommandRecord:
         None
     )
 
-    @property
-    def answer_ms(self) -> ByTransport:
-        """Time from the press, else from the order, to each answer (ms)."""
-        began = self.requested_at if self.pressed_at is None else self.pressed_at
-        return {one: 1000.0 * (at - began) for one, at in self.answer_at.items()}
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandEventRecord:

@@ -4,7 +4,7 @@ A short range is answered row by row; a longer one in equal slices of time, each
 its mean speed and its strictest factor, so that a short slow-down is never lost.
 """
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -124,29 +124,6 @@ def series_of(
             at, dict(zip(charted.values, columns, strict=True)), slice_s
         )
     return found
-
-
-CONFIDENCE_BINS = 20
-
-
-def confidence_counts(
-    connection: Connection, since: float, until: float, robot: str | None = None
-) -> dict[str, Counter[int]]:
-    """Detections of ``since <= at < until``: class as sent → bin → their number."""
-    bins = detections.c.probability * CONFIDENCE_BINS
-    place = whole(connection, bins).label("place")
-    statement = (
-        select(detections.c.class_id, place, func.count())
-        .where(detections.c.at >= since, detections.c.at < until)
-        .group_by(detections.c.class_id, place)
-    )
-    if robot is not None:
-        statement = statement.where(detections.c.robot_id == robot)
-    counts: dict[str, Counter[int]] = defaultdict(Counter)
-    for class_id, number, count in connection.execute(statement):
-        # Certainty itself, 1.0, belongs to the uppermost bin.
-        counts[class_id][min(int(number), CONFIDENCE_BINS - 1)] += count
-    return dict(counts)
 
 
 MOST_STOPS = 2000

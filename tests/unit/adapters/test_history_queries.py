@@ -6,7 +6,7 @@ import pytest
 from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Cursor, Filter, read_cursor, write_cursor
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.series import AIR, SPEEDS, confidence_counts, series_of
+from iveg.adapters.history.series import AIR, SPEEDS, series_of
 from iveg.domain.errors import UnreadableError
 from iveg.domain.records import DetectionRecord, Record
 from tests.databases import remember
@@ -160,21 +160,3 @@ async def test_a_day_of_the_air_is_means_of_five_minutes(
     air = found[()]
     assert (len(air.at), air.slice_s) == (288, 300.0)
     assert set(air.values["co2"]) == {402.0}
-
-
-async def test_detections_are_counted_by_class_and_confidence(
-    queries: Queries, database_url: str
-) -> None:
-    chances = (0.0, 0.0499, 0.05, 0.8, 0.84, 0.95, 1.0)
-    remember(
-        database_url,
-        *(detection_record(probability=chance) for chance in chances),
-        detection_record(class_id="AGII", robot_id="AGII", probability=0.8),
-        detection_record(at=NOON + 99, probability=0.5),
-    )
-
-    found = await queries.ask(confidence_counts, NOON, NOON + 1)
-    of_agii = await queries.ask(confidence_counts, NOON, NOON + 1, "AGII")
-
-    assert found == {"AGII": {16: 1}, "farmer": {0: 2, 1: 1, 16: 2, 19: 2}}
-    assert of_agii == {"AGII": {16: 1}}
