@@ -144,7 +144,7 @@ class ContextBroker:
     ) -> None:
         """Change attributes; create the missing ones; notify."""
         now = clock.wall()
-        changed = entity.apply(changes)
+        changed = entity.apply(changes, now)
         for subscription in self.tenant(scope.service).subscriptions.values():
             if subscription.wants(entity, changed, now):
                 subscription.notify(entity, now)
@@ -206,7 +206,7 @@ class ContextBroker:
 
 _OPTIONS = {"keyValues", "count", "upsert", "skipForwarding"}
 _PARAMETERS = {
-    "id", "type", "attrs", "orderBy", "options", "limit", "offset",
+    "id", "type", "attrs", "metadata", "orderBy", "options", "limit", "offset",
 }  # fmt: skip
 _MAX_BODY = 1 << 20
 _SERVICE = re.compile(r"[a-z0-9_]{0,50}")
@@ -267,8 +267,11 @@ class _Call:
 
     def view(self) -> EntityView:
         """The requested representation."""
+        dated = self.query.get("metadata", "")
+        if dated not in ("", "dateModified"):
+            raise not_supported("metadata other than dateModified")
         names = _split(self.query.get("attrs"))
-        return EntityView(names, "keyValues" in self.options)
+        return EntityView(names, "keyValues" in self.options, bool(dated))
 
     def page(self, shown: Iterable[bytes]) -> Response:
         """The requested part of a list of JSON texts.

@@ -234,11 +234,13 @@ class Attribute:
         value: Parsed JSON.
         instant: Its metadata ``TimeInstant``; empty for none, in a change for the
             present one.
+        modified: Last change (s, Unix time).
     """
 
     type: str
     value: Any
     instant: str = ""
+    modified: float = 0.0
 
     @cached_property
     def json(self) -> bytes:
@@ -253,10 +255,12 @@ class Attribute:
             or self.json != other.json
         )
 
-    def normalized(self) -> bytes:
-        """``{"type", "value", "metadata"}``."""
-        instant = {"TimeInstant": {"type": "DateTime", "value": self.instant}}
-        metadata = instant if self.instant else {}
+    def normalized(self, *, dated: bool) -> bytes:
+        """``{"type", "value", "metadata"}``; the date of change alone if ``dated``."""
+        name, date = "TimeInstant", self.instant
+        if dated:
+            name, date = "dateModified", write_date(self.modified)
+        metadata = {name: {"type": "DateTime", "value": date}} if date else {}
         return b'{"type":%b,"value":%b,"metadata":%b}' % (
             orjson.dumps(self.type),
             self.json,
@@ -270,11 +274,13 @@ class Entity:
 
     Attributes:
         path: Service path.
+        modified: Last change (s, Unix time).
     """
 
     id: str
     type: str
     path: str
+    modified: float = 0.0
     attributes: dict[str, Attribute] = field(default_factory=dict)
 
     @property
@@ -282,7 +288,7 @@ class Entity:
         """Unique key within a tenant."""
         return self.path, self.id, self.type
 
-    def apply(self, changes: Mapping[str, Attribute]) -> set[str]:
+    def apply(self, changes: Mapping[str, Attribute], now: float) -> set[str]:
         """Apply changes; missing attributes are created.
 
         Returns:
@@ -292,10 +298,11 @@ class Entity:
         for name, new in changes.items():
             old = self.attributes.get(name)
             instant = new.instant or (old.instant if old else "")
-            kept = replace(new, instant=instant)
+            kept = replace(new, instant=instant, modified=now)
             if old is None or kept.differs(old):
                 changed.add(name)
             self.attributes[name] = kept
+        self.modified = now
         return changed
 
 
@@ -317,10 +324,12 @@ class EntityView(NamedTuple):
     Attributes:
         names: Attributes in the requested order; empty for all, by name.
         bare: Values alone (``keyValues``) instead of ``normalized``.
+        dated: ``dateModified`` as the only metadata.
     """
 
     names: tuple[str, ...] = ()
     bare: bool = False
+    dated: bool = False
 
 
 def write_entity(entity: Entity, view: EntityView) -> bytes:
@@ -329,7 +338,9 @@ def write_entity(entity: Entity, view: EntityView) -> bytes:
         b'"id":%b,"type":%b' % (orjson.dumps(entity.id), orjson.dumps(entity.type))
     ]
     for name, attribute in _chosen(entity, view.names):
-        printed = attribute.json if view.bare else attribute.normalized()
+        printed = (
+            attribute.json if view.bare else attribute.normalized(dated=view.dated)
+        )
         shown.append(orjson.dumps(name) + b":" + printed)
     return b"{%b}" % b",".join(shown)
 
@@ -338,3 +349,5 @@ def _chosen(entity: Entity, names: tuple[str, ...]) -> Iterable[tuple[str, Attri
     for name in names or sorted(entity.attributes):
         if found := entity.attributes.get(name):
             yield name, found
+        elif name == "dateModified":
+            yield name, Attribute("DateTime", write_date(entity.modified))

@@ -21,7 +21,7 @@ UNPRINTABLE = object()
 
 
 def touch(robot: Entity, value: Any, instant: str) -> set[str]:
-    return robot.apply({"scan": Attribute("array", value, instant)})
+    return robot.apply({"scan": Attribute("array", value, instant)}, 1.0)
 
 
 def test_a_value_is_not_printed_before_somebody_looks_at_it() -> None:

@@ -111,7 +111,7 @@ async def test_each_entity_has_a_connection_on_which_its_values_keep_their_order
         for value in range(100):
             for name in ("AGI", "AGII"):
                 entity = Entity(name, "Robot", "/")
-                entity.apply({"n": Attribute("Number", value)})
+                entity.apply({"n": Attribute("Number", value)}, 0.0)
                 to.notify(entity, 0.0)
         assert set(await to.failures(200)) == {""}
         to.close()
