@@ -78,6 +78,7 @@ DETECTIONS = ListOf(DetectionRecord, _SEEN)
 TRACKS = replace(DETECTIONS, which=tables.detections.c.person_id.is_not(None))
 ODOMETRY = ListOf(OdometryRecord)
 COMMANDS = ListOf(CommandRecord)
+STOPS = replace(COMMANDS, which=tables.commands.c.kind == "stop")
 ALERTS = ListOf(AlertRecord)
 LOG = ListOf(LogRecord, ("class_",))
 NOTE = "log.note"

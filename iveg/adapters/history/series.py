@@ -11,16 +11,13 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, Integer, Table, cast, func, select
 
-from iveg.adapters.history.lists import record_of
 from iveg.adapters.history.tables import (
     climate,
-    commands,
     detections,
     measurements,
     odometry,
 )
 from iveg.domain.day import DaySighting, Pose
-from iveg.domain.records import CommandRecord
 from iveg.vital.record import ODOMETRY_PERIOD_S
 
 
@@ -124,26 +121,6 @@ def series_of(
             at, dict(zip(charted.values, columns, strict=True)), slice_s
         )
     return found
-
-
-MOST_STOPS = 2000
-
-
-def newest_stops(
-    connection: Connection, since: float, until: float, robot: str | None = None
-) -> tuple[CommandRecord, ...]:
-    """The newest STOPs of ``since <= requested_at < until``, oldest first."""
-    c = commands.c
-    statement = (
-        select(commands)
-        .where(c.kind == "stop", c.requested_at >= since, c.requested_at < until)
-        .order_by(c.requested_at.desc(), c.command_id.desc())
-        .limit(MOST_STOPS)
-    )
-    if robot is not None:
-        statement = statement.where(c.robot_id == robot)
-    rows = connection.execute(statement).mappings().all()
-    return tuple(record_of(CommandRecord, row) for row in reversed(rows))
 
 
 def poses_of(connection: Connection, since: float, until: float) -> tuple[Pose, ...]:

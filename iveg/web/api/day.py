@@ -1,4 +1,4 @@
-"""Summaries of the history over HTTP: figures, latency of STOP, the evening sheet."""
+"""Summaries of the history over HTTP: figures, orders, the evening sheet."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Mapping
@@ -13,14 +13,16 @@ from iveg.adapters.history.lists import (
     COMMANDS,
     DECISIONS,
     MOST_ROWS,
+    STOPS,
     Filter,
+    ListOf,
+    R,
 )
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.series import (
     AIR,
     EQUIPMENT,
     SPEEDS,
-    newest_stops,
     people_seen,
     poses_of,
     series_of,
@@ -37,7 +39,6 @@ from iveg.domain.errors import HopError
 from iveg.domain.fleet import FleetDescription, as_counted
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
-from iveg.domain.records import DecisionRecord
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import GreenhouseMap, write_json
 from iveg.models.command import Command
@@ -177,7 +178,7 @@ def _joined(followed: Command | None, kept: Command | None) -> Command | None:
 
 
 _DAY = timedelta(days=1)
-_MOST_DECISIONS = 20 * MOST_ROWS
+_MOST_RECORDS = 20 * MOST_ROWS
 """So many are read; a day with more is told by those."""
 ReadDay = Callable[[date, float], Awaitable[Day]]
 """Has one day read from the history, as far as it has gone (Unix s)."""
@@ -198,13 +199,12 @@ async def _read(queries: Queries, greenhouse: Greenhouse, day: date, now: float)
     until = max(since, min(end, now))
     poses = await queries.ask(poses_of, since, until)
     seen = await queries.ask(people_seen, since, until)
-    worked = worked_minutes(poses, greenhouse)
-    decisions = await _decisions(queries, since, until)
-    stops = await queries.ask(newest_stops, since, until)
+    decisions = await _newest(queries, DECISIONS, since, until)
+    stops = await _newest(queries, STOPS, since, until)
     slowed = slowed_minutes(decisions, greenhouse, until)
     by_name = [
         Worked(lane=lane, robot_id=robot, minutes=robots[robot])
-        for lane, robots in worked.items()
+        for lane, robots in worked_minutes(poses, greenhouse).items()
         for robot in sorted(robots, key=as_counted)
     ]
     by_length = [
@@ -222,22 +222,23 @@ async def _read(queries: Queries, greenhouse: Greenhouse, day: date, now: float)
         passes=[
             Pass.from_value(one) for one in closest_passes(poses, seen, greenhouse)
         ],
-        stops=[Command.from_record(one) for one in stops],
+        stops=[Command.from_record(one) for one in reversed(stops)],
         unseen=len(await queries.unseen_alerts(MOST_KEPT)),
         lost=list(await queries.ask(lost_of, since, until)),
         map=GreenhouseMap.of(greenhouse),
     )
 
 
-async def _decisions(
-    queries: Queries, since: float, until: float
-) -> list[DecisionRecord]:
+async def _newest(
+    queries: Queries, listed: ListOf[R], since: float, until: float
+) -> list[R]:
+    """The newest rows of a range, newest first."""
     wanted = Filter(since=since, until=until, limit=MOST_ROWS)
-    pages = queries.pages(DECISIONS, await queries.page(DECISIONS, wanted), wanted)
-    found: list[DecisionRecord] = []
+    pages = queries.pages(listed, await queries.page(listed, wanted), wanted)
+    found: list[R] = []
     async for page in pages:
         found += page
-        if len(found) >= _MOST_DECISIONS:
+        if len(found) >= _MOST_RECORDS:
             break
     return found
 
