@@ -46,7 +46,7 @@ _HEAD = (
 
 async def _serve(profile: str) -> None:
     async with embedded_fiware() as up:
-        print(up.mqtt_port, up.orion_port, up.iota_port, flush=True)
+        print(up.mqtt_port, up.orion_url, up.iota_url, flush=True)
         profiler = cProfile.Profile()
         if profile:
             profiler.enable()
@@ -72,32 +72,28 @@ def _child(*words: str) -> Iterator["subprocess.Popen[str]"]:
             process.wait(10)
 
 
-def _said(process: "subprocess.Popen[str]") -> list[int]:
+def _said(process: "subprocess.Popen[str]") -> list[str]:
     line = process.stdout.readline()  # type: ignore[union-attr]
-    return [int(word) for word in line.split()]
+    return list(line.split())
 
 
-async def _prepare(
-    orion_port: int, iota_port: int, notify_port: int, most: int
-) -> None:
+async def _prepare(orion_url: str, iota_url: str, notify_port: str, most: int) -> None:
     async with (
-        OrionClient(f"http://{HOST}:{orion_port}", *TENANT) as orion,
-        IotAgentClient(f"http://{HOST}:{iota_port}", *TENANT) as agent,
+        OrionClient(orion_url, *TENANT) as orion,
+        IotAgentClient(iota_url, *TENANT) as agent,
     ):
         robots = [f"R{index}" for index in range(most)]
-        await provision(
-            agent, orion, FiwareSite(robots, "iveg", f"http://{HOST}:{orion_port}")
-        )
+        await provision(agent, orion, FiwareSite(robots, "iveg", orion_url))
         url = f"http://{HOST}:{notify_port}/ngsi/notifications"
         await ensure_subscriptions(orion, url, "ab" * 16, wanted_for())
 
 
 def _run(
-    robots: int, seconds: float, fiware: int, receiver: int, ports: tuple[int, int]
+    robots: int, seconds: float, fiware: int, receiver: int, ports: tuple[str, str]
 ) -> list[str]:
     """One fleet for a while: one row."""
     before = Usage.of(fiware), Usage.of(receiver)
-    words = ("send", str(ports[0]), str(robots), str(seconds))
+    words = ("send", ports[0], str(robots), str(seconds))
     ended = subprocess.run(
         [sys.executable, "-m", "benchmarks.fiware_ends", *words],
         capture_output=True,

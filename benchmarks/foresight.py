@@ -16,7 +16,6 @@ import numpy as np
 
 from benchmarks.process import percentile, print_table
 from benchmarks.protection import staged
-from iveg.app.virtual import VirtualPipeline
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.observations import Instant
 from iveg.domain.rule.foresight import path_of
@@ -24,6 +23,7 @@ from iveg.domain.rule.paths import AHEAD_S, HORIZON_S, MOVES_M_S
 from iveg.lab.emulator.world import SimulatedWorld
 from iveg.lab.experiment.protection import NEAR_M
 from iveg.lab.experiment.stage import STEP_S
+from iveg.lab.experiment.virtual import VirtualPipeline
 
 HORIZONS_S = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 _EVERY = 4

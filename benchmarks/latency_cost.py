@@ -45,7 +45,7 @@ def main() -> None:
             spent += between - began
     messages = ROBOTS * HZ * SECONDS
     began = time.thread_time()
-    parts = collect(watch.streams)
+    parts = collect(watch.streams.values())
     collected = time.thread_time() - began
     for sketch in merge(parts).values():
         sketch.quantile(0.95)

@@ -17,7 +17,7 @@ import numpy as np
 import orjson
 
 from benchmarks.process import print_table
-from iveg.app.dss import Dss, open_dss
+from iveg.app import App
 from iveg.asgi import create_app
 from iveg.ngsi.codec import read_notification
 from iveg.settings import Settings
@@ -126,20 +126,20 @@ class Line:
         await self._app(scope, receive, send)
 
 
-async def whole_way(dss: Dss, line: Line, bodies: list[bytes]) -> float:
+async def whole_way(app: App, line: Line, bodies: list[bytes]) -> float:
     """CPU seconds per 1,000 messages, queue emptied outside the measure."""
     began = time.process_time()
     for one in bodies:
         await line.post(one)
     spent = (time.process_time() - began) / len(bodies) * 1000
-    for received in dss.pipeline.ingest.drain():
-        dss.core.world.apply(received)
+    for received in app.pipeline.ingest.drain():
+        app.core.world.apply(received)
     return spent
 
 
-async def rows(dss: Dss) -> list[list[str]]:
-    dss.provisioner.subscription_ids = frozenset({SUBSCRIPTION})
-    line = Line(create_app(dss), dss.notify_secret)
+async def rows(app: App) -> list[list[str]]:
+    app.provisioner.subscriptions.ids = frozenset({SUBSCRIPTION})
+    line = Line(create_app(app), app.notify_secret)
     table = []
     for kind in ("odometry", "scan", "detections"):
         best: dict[str, float] = {}
@@ -147,8 +147,8 @@ async def rows(dss: Dss) -> list[list[str]]:
             first = 1 + turn * 10 * MESSAGES
             fresh = [body(kind, first + n) for n in range(MESSAGES)]
             cases = {"read": per_thousand(read_notification, fresh)}
-            cases["whole"] = await whole_way(dss, line, fresh)
-            cases["twin"] = await whole_way(dss, line, fresh)
+            cases["whole"] = await whole_way(app, line, fresh)
+            cases["twin"] = await whole_way(app, line, fresh)
             for name, spent in cases.items():
                 best[name] = min(spent, best.get(name, spent))
         table.append([kind, *(f"{spent:.3f}" for spent in best.values())])
@@ -159,8 +159,8 @@ async def rows(dss: Dss) -> list[list[str]]:
 
 def main() -> None:
     with TemporaryDirectory() as directory:
-        dss = open_dss(Settings(), Path(directory))
-        told = asyncio.run(rows(dss))
+        app = App(Settings(), Path(directory))
+        told = asyncio.run(rows(app))
     head = ("kind", "reading", "whole way", "the same of a twin")
     print_table("CPU seconds per 1,000 notifications", head, told)
 

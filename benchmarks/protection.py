@@ -15,7 +15,6 @@ from typing import Any
 from benchmarks.process import print_table
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.app.virtual import VirtualPipeline
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.witness import Plan
 from iveg.lab.emulator.camera import DETECTORS
@@ -28,7 +27,8 @@ from iveg.lab.experiment.protection import (
     protection_of,
     total_of,
 )
-from iveg.lab.experiment.stage import STEP_S, Row, Stage, foretold_row
+from iveg.lab.experiment.stage import STEP_S, Row, Sensing, Stage, encounter_row
+from iveg.lab.experiment.virtual import VirtualPipeline
 
 ROBOTS = ("AGI", "AGII")
 
@@ -46,17 +46,17 @@ def staged(
     layout = lay_out(scenario, ROBOTS, greenhouse)
     iveg = VirtualPipeline(load_fleet(words=ROBOTS), greenhouse, rule)
     world = SimulatedWorld(greenhouse, layout, DETECTORS[profile], seed)
-    parts = iveg.parts
     stage = Stage(
         world,
-        parts.ingest,
-        parts.loop,
+        iveg.parts,
         iveg.feedback,
         iveg.move,
         iveg.hear,
-        scan_every=2 if laser else 0,
-        plan=Plan.of(greenhouse),
-        is_witness=own,
+        Sensing(
+            scan_every=2 if laser else 0,
+            own_laser=own,
+            plan=Plan.from_greenhouse(greenhouse),
+        ),
     )
     return stage, world, iveg
 
@@ -76,9 +76,9 @@ def run(
     for _ in range(round(seconds / STEP_S)):
         stage.step()
         for robot_id, rig in world.rigs.items():
-            driving = stage.robots[robot_id].driving
-            truth.append(true_picture(rig, world, stage.now.mono, driving))
-            told.append(foretold_row(iveg, truth[-1]))
+            robot, now = stage.robots[robot_id], stage.now.mono
+            truth.append(true_picture(rig, world, now, robot.wanted, robot.factor))
+            told.append(encounter_row(iveg, truth[-1]))
     return protection_of(moments_of(truth, told))
 
 

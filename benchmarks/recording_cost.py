@@ -3,8 +3,8 @@
     python -m benchmarks.recording_cost --robots 10 --seconds 20 --rounds 3
 
 A real server with a reader of its page, and a fleet that talks at 30 Hz in a storm: no
-two looks are alike.  With and without recordings in turns; an age is that of a robot's
-odometry when the frame with it came to the reader.
+two looks are alike.  The disk needs 21 GB free.  With and without recordings in turns;
+an age is that of a robot's odometry when the frame with it came to the reader.
 """
 
 import argparse

@@ -116,14 +116,14 @@ class Robot:
             for name, kind in SENSORS.items()
         }
         self._static = dds.writer("/tf_static", ros.TFMessage, names.TF_STATIC)
-        header = ros.Header(ros.Time.of(time.time()), "base_link")
+        header = ros.Header(ros.Time.from_seconds(time.time()), "base_link")
         mount = ros.TransformStamped(header, "laser")
         self._static.write(cdr.write(ros.TFMessage((mount,))))
         self._ranges = np.linspace(1.0, 20.0, 720, dtype=np.float32)
 
     def say(self) -> None:
         """Everything once."""
-        stamp = ros.Time.of(time.time())
+        stamp = ros.Time.from_seconds(time.time())
         in_map, in_odom = ros.Header(stamp, "map"), ros.Header(stamp, "odom")
         base = ros.Header(stamp, "base_link")
         sure = ros.ObjectHypothesisWithPose(ros.ObjectHypothesis("tomato", 0.9))

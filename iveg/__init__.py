@@ -1,3 +1,3 @@
 """iVeg: supervise mixed robot fleets in greenhouses, and prove every slow-down."""
 
-__version__ = "0.1.0"
+__version__ = "2.0.0"

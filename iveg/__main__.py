@@ -3,14 +3,14 @@
 import gc
 import sys
 
-# What is imported stays: to look through it again and again would find nothing.
+# Imported objects live for ever: collecting among them often would free nothing.
 gc.set_threshold(100_000, 20, 50)
 
 from iveg.cli import main  # noqa: E402 - after the line above
 
 
 def run() -> None:
-    """Run and leave with the command's exit code."""
+    """Run a command, and exit with its code."""
     sys.exit(main(sys.argv[1:]))
 
 

@@ -1,6 +1,6 @@
-"""The parts of a running iVeg between its adapters and its pages, and their wiring.
+"""Parts of a running iVeg between its adapters and its pages, and their wiring.
 
-Here alone comfort is had to listen to what is vital.
+Only this module connects comfort to the events of vital parts.
 """
 
 from collections import Counter
@@ -35,14 +35,14 @@ from iveg.vital.supervision import Supervision
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """An operator's choices.
+    """An operator's choices, and the identity of this start.
 
     Attributes:
-        kept: Those that were made while iVeg ran.
+        kept: Choices made while iVeg ran, from disk.
         boot: Random, new at each start; identity of our feedback.
-        era: Ends the ids of people, which are unique across starts by it.
-        tiles: Of other equipment.
-        refused: Robots of the fleet that are not heard.
+        era: Suffix of people's ids, which makes them unique across starts.
+        tiles: Tiles of other equipment.
+        refused: Robots of the fleet whose messages are refused.
     """
 
     kept: KeptChoices
@@ -53,7 +53,7 @@ class Choices:
 
 
 class Pipeline:
-    """The parts, each by its name; nothing runs until ``loop.run()``.
+    """Parts by name; nothing runs until ``loop.run()``.
 
     STOP and speed limits need none from ``latency`` on.
     """
@@ -93,12 +93,12 @@ class Pipeline:
         self.trials = Trials(core, self.evaluator, self.rules)
 
     def counters(self) -> Counter[str]:
-        """Everything that is counted in it."""
+        """Counters of all parts."""
         total = Counter(self.ingest.counters)
         total.update(self.core.world.counters)
         total.update(self.commander.counters)
         total.update(self.core.supervision.counters)
-        total["live.browsers"] = self.hub.watchers
+        total["live.browsers"] = len(self.hub.subscribers)
         return total
 
 
@@ -129,5 +129,4 @@ def _ingest(core: Core) -> Ingest:
         slots = {"source": source, "reason": reason}
         event_log.log(LogEvent("system", "log.rejected", slots), clock())
 
-    tell_arrival = partial(core.supervision.tell, "arrived")
-    return Ingest(world, tell_arrival, log_rejected)
+    return Ingest(world, partial(core.supervision.tell, "arrived"), log_rejected)

@@ -1,7 +1,7 @@
-"""Types of settings: a check of the value, and behind it the check in words."""
+"""Types of settings: each a check of the value, followed by the check in words."""
 
 from ipaddress import ip_address
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 from urllib.parse import urlsplit
 
 from annotated_types import Interval
@@ -17,6 +17,7 @@ def _address(*schemes: str) -> AfterValidator:
         parts = urlsplit(value)
         if parts.scheme not in schemes or not parts.hostname or parts.port == 0:
             raise ValueError(value)
+        # Paths are joined to it with a slash of their own.
         return value.rstrip("/")
 
     return AfterValidator(read)
@@ -31,13 +32,14 @@ def is_safe_address(url: str) -> bool:
         return False
     if not host or port == 0 or parts.username is not None or parts.fragment:
         return False
+    # Letters that look alike could lead a secret to another host.
     if not url.isascii() or not url.isprintable() or " " in url:
         return False
     return parts.scheme == "https" or (parts.scheme == "http" and is_loopback(host))
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a host is this machine, by its looks; names are not resolved."""
+    """Whether a host names this machine; names are not resolved."""
     try:
         return ip_address(host).is_loopback
     except ValueError:
@@ -45,27 +47,20 @@ def is_loopback(host: str) -> bool:
 
 
 def _read_safe_address(url: str) -> str:
-    # As it is: the issuer is compared to the last slash.
+    # Not trimmed: an issuer is compared to the last slash.
     if not is_safe_address(url):
         raise ValueError(url)
     return url
 
 
-def _read_roles(text: str) -> tuple[str, ...]:
-    rows = tuple(row.strip() for row in text.split(","))
-    read = [split_role(row) for row in rows]
-    if None in read or len({found[0] for found in read if found}) != len(rows):
+def _split_roles(text: str) -> tuple[tuple[str, str], ...]:
+    # The last equals sign: a value such as a group's name may hold some itself.
+    rows = [row.rpartition("=") for row in text.split(",")]
+    roles = {value.strip(): role.strip() for value, _, role in rows}
+    # A value that gives two roles would leave it open which of them counts.
+    if len(roles) < len(rows) or "" in roles:
         raise ValueError(text)
-    return rows
-
-
-def split_role(row: str) -> tuple[str, PersonRole] | None:
-    """Value of a claim and the role that it gives; None: neither is told."""
-    value, _, word = row.rpartition("=")
-    role = next(
-        (known for known in get_args(PersonRole) if known == word.strip()), None
-    )
-    return (value.strip(), role) if role and value.strip() else None
+    return tuple(roles.items())
 
 
 def _read_robots(text: str) -> tuple[str, ...]:
@@ -98,8 +93,8 @@ SafeUrl = Annotated[
     "an https address, or one of this machine",
 ]
 RoleMap = Annotated[
-    tuple[str, ...],
-    BeforeValidator(_read_roles),
+    tuple[tuple[str, PersonRole], ...],
+    BeforeValidator(_split_roles),
     "values of the claim and roles, such as growers=operator,owners=admin",
 ]
 Line = Annotated[
@@ -175,12 +170,13 @@ def rule_value(row: Parameter) -> Any:
             if own is None:
                 raise ValueError(text)
             by_class[own] = float(value)
-        found = ByClass(float(every), by_class)
+        numbers = ByClass(float(every), by_class)
+        # A class that is named twice contradicts itself.
         if len(by_class) < len(others):
             raise ValueError(text)
-        if not all(row.least <= value <= row.most for value in found.values):
+        if not all(row.least <= value <= row.most for value in numbers.values):
             raise ValueError(text)
-        return found
+        return numbers
 
     allowed = f"a number from {row.least:g} to {row.most:g}, also by class (2,robot=3)"
     return Annotated[Any, BeforeValidator(read), allowed]

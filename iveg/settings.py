@@ -1,4 +1,4 @@
-"""Every setting, its variable, its default and what it may be.
+"""Every setting: its variable, its default, and the values that it may have.
 
 Built once from an environment that is handed in; read by ``cli`` and ``app`` alone.
 ``docs/settings.md`` is generated from the table below.
@@ -14,7 +14,7 @@ from typing import Annotated, Any, Final, Literal, get_args, get_type_hints
 from annotated_types import Interval
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from iveg.domain.accounts import DEFAULT_NAME, PersonRole
+from iveg.domain.accounts import DEFAULT_NAME
 from iveg.domain.errors import SettingsError
 from iveg.domain.limits import LIMITS
 from iveg.domain.parameters import PARAMETERS, ByClass, Parameters
@@ -40,11 +40,10 @@ from iveg.setting_types import (
     Token,
     Url,
     rule_value,
-    split_role,
 )
 
 _QUIET: Final = ConfigDict(hide_input_in_errors=True)
-"""A secret that cannot be used stands in no traceback either."""
+"""Keeps a secret that cannot be used out of tracebacks."""
 _SECRETS: Final = frozenset(
     {
         "IVEG_NOTIFY_TOKEN",
@@ -67,11 +66,13 @@ GONE: Final = frozenset(
         "IVEG_NOTIFY_TOKEN_PREVIOUS",
         "IVEG_ORION_THROTTLE",
         "IVEG_RELEASE_PROOF_MINUTES",
+        "IVEG_SSO_HOURS",
+        "IVEG_SSO_PROVIDER",
         "IVEG_TRUTH",
         "IVEG_UPLINK",
     }
 )
-"""Settings of earlier versions; docs/upgrading.md says what took their place."""
+"""Settings of earlier versions; docs/upgrading.md names their successors."""
 
 
 def setting(variable: str, default: Any, help_: str) -> Any:
@@ -150,7 +151,7 @@ class Settings:
     fiware_user: Line = setting(
         "IVEG_FIWARE_USER",
         "",
-        "User as whom iVeg asks for a token (password grant); empty: as itself (client "
+        "User for whom iVeg gets a token (password grant); empty: for itself (client "
         "credentials).",
     )
     fiware_password: Line = setting(
@@ -214,7 +215,7 @@ class Settings:
     sign_in_name: Name = setting(
         "IVEG_SIGN_IN_NAME",
         DEFAULT_NAME,
-        "Name of whoever signs in by the link, in everything that they do.",
+        "Name of the person who signs in by the link, in all their acts.",
     )
     sso_issuer: SafeUrl = setting(
         "IVEG_SSO_ISSUER",
@@ -303,12 +304,12 @@ class Settings:
     recordings: Switch = setting(
         "IVEG_RECORDINGS",
         True,
-        "Keep what comes in, byte for byte, and pictures of what pages are sent "
-        "(docs/interfaces/recordings.md).",
+        "Keep what comes in, byte for byte, and pictures of what pages are sent, while "
+        "20 GB of the disk are free (docs/interfaces/recordings.md).",
     )
     keep_recordings_days: Days = setting(
         "IVEG_KEEP_RECORDINGS_DAYS",
-        RecordingLimits.days,
+        7,
         "Recordings of either sort (days with one; 0: for ever).",
     )
     keep_recordings_gb: Gigabytes = setting(
@@ -346,6 +347,7 @@ class Settings:
         values, rule = dict[str, Any](), dict[str, Any]()
         for row in _rows():
             text = environment.get(row.variable, "")
+            # Compose files pass on unset variables as empty ones.
             if text:
                 into = rule if row.is_of_rule else values
                 into[row.name] = _read(row, text)
@@ -355,25 +357,28 @@ class Settings:
 
     def _check_together(self) -> None:
         """Raise SettingsError where two settings contradict each other."""
-        kept, forever = self.retention, math.inf
-        decisions = kept.decisions or forever
+        # 0 days means for ever, which is longer than any number of days.
+        kept_days, forever = self.retention, math.inf
+        decisions = kept_days.decisions or forever
         for is_so, variable, value, allowed in (
             (
+                # A robot that stood first would never slow down on the way there.
                 self.feedback_stand_s > self.feedback_slow_s,
                 "IVEG_FEEDBACK_STAND_S",
                 f"{self.feedback_stand_s:g}",
                 "more than IVEG_FEEDBACK_SLOW_S",
             ),
             (
-                (kept.positions or forever) <= decisions,
+                (kept_days.positions or forever) <= decisions,
                 "IVEG_KEEP_POSITIONS_DAYS",
-                str(kept.positions),
+                str(kept_days.positions),
                 "no longer than IVEG_KEEP_DECISIONS_DAYS",
             ),
             (
-                (kept.audit or forever) >= decisions,
+                # Steps of orders belong to commands, which are kept as decisions are.
+                (kept_days.audit or forever) >= decisions,
                 "IVEG_KEEP_AUDIT_DAYS",
-                str(kept.audit),
+                str(kept_days.audit),
                 "no shorter than IVEG_KEEP_DECISIONS_DAYS",
             ),
             (
@@ -399,13 +404,8 @@ class Settings:
                 raise SettingsError(variable, value, allowed)
 
     @property
-    def sso_role_map(self) -> dict[str, PersonRole]:
-        """Value of the provider's claim → the role that it gives."""
-        return dict(row for text in self.sso_roles if (row := split_role(text)))
-
-    @property
     def limits_of_recordings(self) -> tuple[RecordingLimits, RecordingLimits]:
-        """Limits of what came in, and of pictures."""
+        """Limits of the two kinds of recordings: inputs, and pictures."""
         days = self.keep_recordings_days
         return (
             RecordingLimits(days, self.keep_recordings_gb * 10**9),
@@ -428,11 +428,11 @@ class Settings:
         return self.notify_url or f"http://{self.host}:{self.port}/ngsi/notifications"
 
     def without_secrets(self) -> dict[str, str]:
-        """All of them by variable; of secrets and logins nothing."""
+        """Settings by variable, with secrets and logins hidden."""
         values = self.to_environment()
-        shown = {name: _without_login(text) for name, text in values.items()}
+        public_values = {name: _without_login(text) for name, text in values.items()}
         hidden = {name: "(hidden)" for name in _SECRETS if values[name]}
-        return {**shown, **hidden}
+        return {**public_values, **hidden}
 
     def to_environment(self) -> dict[str, str]:
         """The environment that gives the same settings to a child process."""
@@ -449,7 +449,7 @@ class _Row:
     """One setting.
 
     Attributes:
-        hint: Type, with what its value may be.
+        hint: Type, with a check of the value and the check in words.
         is_of_rule: A parameter of the rule (``domain/parameters.py``).
     """
 
@@ -462,7 +462,7 @@ class _Row:
 
 
 def _rows() -> Iterator[_Row]:
-    """Every setting; those of the rule stand where the table has the rule."""
+    """Every setting; the parameters of the rule take the place of its field."""
     hints = get_type_hints(Settings, include_extras=True)
     for field_ in fields(Settings):
         if field_.name == "rule":
@@ -480,12 +480,12 @@ def _read(row: _Row, text: str) -> Any:
     try:
         return TypeAdapter(row.hint, config=_QUIET).validate_python(text)
     except ValidationError as error:
-        shown = "(hidden)" if row.variable in _SECRETS else _without_login(text)
-        raise SettingsError(row.variable, shown, _allowed(row.hint)) from error
+        public_value = "(hidden)" if row.variable in _SECRETS else _without_login(text)
+        raise SettingsError(row.variable, public_value, _allowed(row.hint)) from error
 
 
 def _allowed(hint: Any) -> str:
-    """Description of the allowed values, from the annotation of the type."""
+    """Allowed values in words, from the annotation of the type."""
     rule = getattr(hint, "__metadata__", ("",))[-1]
     if isinstance(rule, Interval):
         return f"a number from {rule.ge:g} to {rule.le:g}"
@@ -501,9 +501,9 @@ def _write(value: object) -> str:
     if isinstance(value, bool):
         return "on" if value else "off"
     if isinstance(value, tuple):
-        return ",".join(value)
+        return ",".join(x if isinstance(x, str) else "=".join(x) for x in value)
     if isinstance(value, ByClass):
-        by_class = (f"{class_}={one}" for class_, one in value.by_class.items())
+        by_class = (f"{class_}={number}" for class_, number in value.by_class.items())
         return ",".join((str(value.every), *by_class))
     return str(value)
 

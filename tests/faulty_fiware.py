@@ -23,7 +23,7 @@ from iveg.lab.embedded.context_broker import ContextBroker
 from iveg.lab.embedded.entities import Scope
 from iveg.lab.embedded.iot_agent import IotAgent
 from iveg.lab.embedded.mqtt_broker import MqttBroker
-from iveg.lab.embedded.server import Running, embedded_fiware, serve_fiware
+from iveg.lab.embedded.server import Running, embedded_fiware
 from iveg.settings import Settings
 
 MODULE = "tests.faulty_fiware"
@@ -62,14 +62,14 @@ class FaultyAgent(IotAgent):
         else:
             self._unstuck.set()
 
-    def hear(self, topic: str, payload: bytes) -> None:
+    def receive(self, topic: str, payload: bytes) -> None:
         if self._faults.deaf:
             return
         if self._faults.slow_s > 0:
             loop = asyncio.get_running_loop()
-            loop.call_later(self._faults.slow_s, super().hear, topic, payload)
+            loop.call_later(self._faults.slow_s, super().receive, topic, payload)
         else:
-            super().hear(topic, payload)
+            super().receive(topic, payload)
 
     async def command(
         self, scope: Scope, name: str, kind: str, values: Mapping[str, object]
@@ -107,15 +107,13 @@ def main() -> int:
     urls = settings.mqtt_url, settings.orion_url, settings.iota_url
     parts = [urlsplit(url) for url in urls]
     mqtt, orion, iota = ((part.hostname or "", part.port or 0) for part in parts)
-    return run_until_stopped(
-        serve_fiware(
-            mqtt,
-            orion,
-            iota,
-            notify_ready=report_ready,
-            make_agent=FaultyAgent,
-        )
-    )
+
+    async def serve() -> None:
+        async with embedded_fiware(mqtt, orion, iota, make_agent=FaultyAgent):
+            report_ready()
+            await asyncio.Event().wait()
+
+    return run_until_stopped(serve())
 
 
 if __name__ == "__main__":

@@ -56,8 +56,14 @@ MUTANTS = (
         ("unit/domain/test_stop.py",),
     ),
     Mutant(
+        "STOP: a robot's own clock alone says how long it has stood",
+        "lasted = min(newest.since(began), arrived_s)",
+        "lasted = newest.since(began)",
+        ("unit/domain/test_standstill.py",),
+    ),
+    Mutant(
         "STOP: odometry that still moves does not contradict a standstill",
-        "and not self._wheels_moved(moment, at)",
+        "and not self._wheels_moved(moment)",
         "",
         ("unit/domain/test_stop.py",),
     ),
@@ -105,20 +111,20 @@ MUTANTS = (
     ),
     Mutant(
         "rule: one reason that is over ends the limit of all",
-        "all(one.outside_since is not None for one in mine.values())",
-        "any(one.outside_since is not None for one in mine.values())",
+        "all(entry.outside_since is not None for entry in entries.values())",
+        "any(entry.outside_since is not None for entry in entries.values())",
         ("unit/domain/rule/test_judge.py",),
     ),
     Mutant(
         "rule: an encounter that is foretold slows nobody",
-        "soon = {one.zone.cause for one in on_path if one.in_s <= soon_s}",
-        "soon = set[str]()",
+        "item.zone.cause for item in on_path if item.in_s <= soon_s",
+        "item.zone.cause for item in on_path if False",
         ("unit/domain/rule/test_foresight.py",),
     ),
     Mutant(
         "rule: people are foretold to stay where they are",
-        "return zone.x, zone.y, sighting.vx, sighting.vy, age, radius",
-        "return zone.x, zone.y, 0.0, 0.0, age, radius",
+        "return MovingZone(zone.x, zone.y, sighting.vx, sighting.vy, age, radius)",
+        "return MovingZone(zone.x, zone.y, 0.0, 0.0, age, radius)",
         ("unit/domain/rule/test_foresight.py",),
     ),
     Mutant(
@@ -148,25 +154,25 @@ MUTANTS = (
     Mutant(
         "STOP: a restart asserts a hold that a release has named",
         "if self.hold_id in self.named:",
-        "if self.hold_id in self.asked[1:]:",
+        "if self.hold_id in self.open_release[1:]:",
         ("properties/test_stop_transports.py",),
     ),
     Mutant(
         "rule: exactly the threshold is no longer enough",
-        "if confidence < self.threshold.of(class_):",
-        "if confidence <= self.threshold.of(class_):",
+        "if confidence < self.threshold.for_class(class_):",
+        "if confidence <= self.threshold.for_class(class_):",
         ("unit/domain",),
     ),
     Mutant(
-        "rule: exactly on the ring is outside",
-        "elif one.outside_m <= 0.0:",
-        "elif one.outside_m < 0.0:",
+        "rule: exactly on the border of a zone is outside",
+        "elif outside_m <= 0.0:",
+        "elif outside_m < 0.0:",
         ("unit/domain/rule/test_judge.py",),
     ),
     Mutant(
-        "rule: two rings slow a robot by the one that is farther away",
-        "if known is None or found.outside_m < known.outside_m:",
-        "if known is None or found.outside_m > known.outside_m:",
+        "rule: of two zones the one that is farther away slows a robot",
+        "if known is None or distance.outside_m < known.outside_m:",
+        "if known is None or distance.outside_m > known.outside_m:",
         ("unit/domain/rule/test_judge.py",),
     ),
     Mutant(
@@ -177,7 +183,7 @@ MUTANTS = (
     ),
     Mutant(
         "freshness: any feedback is fresh when it comes, however old its evidence",
-        "evidence = self.sent_at(seen)",
+        "evidence = self.sent_at(seq)",
         "evidence = now",
         ("unit/robot/test_feedback.py",),
     ),
@@ -225,8 +231,8 @@ MUTANTS = (
     ),
     Mutant(
         "clear: a frame with somebody who could not be placed is whole",
-        '    if unplaced:\n        return "unreadable" if has_pose',
-        '    if False:\n        return "unreadable" if has_pose',
+        'if unplaced:\n            return "unreadable" if has_pose',
+        'if False:\n            return "unreadable" if has_pose',
         ("unit/domain/test_detector.py",),
     ),
     Mutant(
@@ -291,8 +297,8 @@ MUTANTS = (
     ),
     Mutant(
         "STOP: a hold is adopted from a report however old it is",
-        "self.evidence.ours[-1:] if age_s <= LIMITS.report_stale_s else []",
-        "self.evidence.ours[-1:]",
+        "own_holds and self.evidence.evidence_age(at) <= LIMITS.report_stale_s",
+        "own_holds",
         ("unit/vital/test_earlier_boots.py",),
     ),
     Mutant(
@@ -309,7 +315,7 @@ MUTANTS = (
     ),
     Mutant(
         "STOP: motion from before the rest contradicts it when it comes late",
-        "if moment.boot is None or after is None:",
+        "if began is None or moment.boot is None:",
         "if True:",
         ("unit/domain/test_standstill.py",),
     ),
@@ -330,7 +336,7 @@ MUTANTS = (
         "vital: a part ends without a last word to the robots",
         "await _say(last_word)",
         "",
-        ("unit/app",),
+        ("unit/vital/test_life.py",),
     ),
     Mutant(
         "vital: a scan that cannot be taken in ends the rule loop",
@@ -352,7 +358,7 @@ MUTANTS = (
     ),
     Mutant(
         "rule: somebody without a place slows nobody",
-        "self.unplaced += _may_be_somebody(detection, rule)",
+        "self.unplaced += _may_be_somebody(detection, verdict, judged.rule)",
         "self.unplaced += 0",
         ("unit/vital/test_frames.py",),
     ),
@@ -400,8 +406,8 @@ MUTANTS = (
     ),
     Mutant(
         "clear: whoever contradicts itself finds a spot empty",
-        "if looked is None or not robot.is_believed(now):",
-        'if looked is None or robot.link(now) != "LIVE":',
+        "if self.detections_at is None or not self.is_believed(now):",
+        'if self.detections_at is None or self.link(now) != "LIVE":',
         ("unit/domain/tracking/test_sight.py",),
     ),
     Mutant(

@@ -56,16 +56,11 @@ def until(probe: Callable[[], T | None], what: str, within_s: float = PATIENCE_S
 
 @dataclass
 class Program:
-    """One ``python -m iveg WORD …``, its output in a file.
-
-    Attributes:
-        log_from: Where in the log the part begins that must be clean.
-    """
+    """One ``python -m iveg WORD …``, its output in a file."""
 
     words: tuple[str, ...]
     process: subprocess.Popen[bytes] | Forked
     log: Path
-    log_from: int = 0
 
     @property
     def pid(self) -> int:
@@ -86,12 +81,8 @@ class Program:
 
     def complaints(self) -> list[str]:
         """Lines that a clean run does not have, on a machine as busy as it may be."""
-        dirty = _DIRTY.findall(self.text()[self.log_from :])
+        dirty = _DIRTY.findall(self.text())
         return [line for line in dirty if _BUSY.search(line) is None]
-
-    def forgive(self) -> None:
-        """What was logged until now was provoked by the test."""
-        self.log_from = len(self.text())
 
     def interrupt(self) -> int:
         """What Ctrl-C does; returns the exit status."""

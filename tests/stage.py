@@ -5,18 +5,19 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.app.virtual import read_direct
 from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, DetectionRecord
 from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
-from iveg.lab.emulator.world import SimulatedWorld
 from iveg.lab.experiment import stage as staging
 from iveg.lab.experiment.stage import STEP_S
+from iveg.lab.experiment.virtual import read_direct
+from iveg.models.history import LogEntry
 from iveg.pipeline import Pipeline
 from iveg.vital.operators import ThingMarks
 from iveg.web.views import Views
+from tests.faulty_world import FaultyWorld
 from tests.unit.vital.desk import Desk, settle
 
 Json = dict[str, Any]
@@ -47,27 +48,28 @@ class Stage:
     ) -> None:
         greenhouse = load_greenhouse(scenario_named(scenario).greenhouse)
         layout = lay_out(scenario_named(scenario), robots, greenhouse)
-        world = SimulatedWorld(greenhouse, layout, DETECTORS[profile], seed)
+        self._world = FaultyWorld(greenhouse, layout, DETECTORS[profile], seed)
         self.desk = desk = Desk(robots, greenhouse)
         desk.evaluator.rule = replace(desk.evaluator.rule, foresight=foresight)
         self._views = Views(desk.parts)
         self._stage = staging.Stage(
-            world,
-            desk.ingest,
-            desk.loop,
+            self._world,
+            desk.parts,
             desk.fleet.told,
             self._move,
             self._hear,
         )
-        self.happen = self._stage.happen
+        self.happen = self._world.happen
 
     def _move(self, seconds: float) -> Instant:
         self.desk.clock.now = seconds
         return self.now
 
     def _hear(self, topic: str, payload: bytes) -> None:
-        for received in read_direct(topic, payload, self.now):
-            self.desk.ingest.enqueue(received)
+        sent = self._world.sent(topic, payload)
+        if sent is not None:
+            for received in read_direct(topic, sent, self.now):
+                self.desk.ingest.enqueue(received)
 
     @property
     def parts(self) -> Pipeline:
@@ -141,7 +143,7 @@ class Stage:
 
     def log(self, robot_id: str | None, key: str) -> list[Json]:
         """Lines whose key begins so, oldest first; of one robot or of all."""
-        told = self._views.log(list(self.desk.event_log.lines))
+        told = map(LogEntry.from_record, self.desk.event_log.lines)
         lines: list[Json] = [one.model_dump() for one in told]
         return [
             line

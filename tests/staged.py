@@ -70,19 +70,19 @@ STAGED = {
         ("another iVeg speaks to the robots", "stop one of them"),
     ),
     "half speed": (
-        facts(report=HALF, near=AISLE_3, limit=TOLD, told_near=AISLE_3),
+        facts(report=HALF, near=AISLE_3, limit=TOLD, limit_near=AISLE_3),
         "caution",
         ("a media velocidad", "persona en el pasillo 3 a 1,4 m"),
         ("at half speed", "person in aisle 3 at 1.4 m"),
     ),
     "half speed for a memory": (
-        facts(report=HALF, near=UNSEEN, limit=TOLD, told_near=UNSEEN),
+        facts(report=HALF, near=UNSEEN, limit=TOLD, limit_near=UNSEEN),
         "caution",
         ("a media velocidad", "hubo una persona en el pasillo 3", "hace 4 s"),
         ("at half speed", "a person was in aisle 3", "4 s ago"),
     ),
     "a zone ahead": (
-        facts(report=HALF, near=AHEAD, limit=TOLD, told_near=AHEAD),
+        facts(report=HALF, near=AHEAD, limit=TOLD, limit_near=AHEAD),
         "caution",
         ("a media velocidad", "persona a 3,4 m, su zona en 1,8 s"),
         ("at half speed", "person at 3.4 m, its zone in 1.8 s"),

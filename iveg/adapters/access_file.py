@@ -1,11 +1,11 @@
-"""File of accounts, tokens and sessions, which memory writes and a start reads.
+"""File of accounts, tokens and sessions: written from memory, read at the start.
 
-JSON lines, a record in each, replaced as a whole beside the requests: a disk that is
-slow, full or gone holds up no sign-in and no STOP.  A file that another
-program changed while iVeg ran is put aside and written anew from memory; of a file that
-was damaged before the start every whole line is read.  No token is in it, only SHA-256.
+It holds JSON lines, one record each, and is replaced as a whole beside the requests: a
+slow, full or missing disk holds up no sign-in and no STOP.  A file that another program
+changed while iVeg ran is put aside and written anew from memory.  A file that was
+damaged before the start is read line by line.  It holds no token, only its SHA-256.
 
-``iveg user`` leaves each change in a file beside it, and the server takes that up.
+``iveg user`` leaves each change in a file beside it, which the server takes up.
 """
 
 import asyncio
@@ -21,10 +21,16 @@ import orjson
 from pydantic import TypeAdapter
 
 from iveg.adapters.clock import new_id
-from iveg.adapters.files import Form, load_lines, put_aside, write_bytes, write_lines
+from iveg.adapters.files import (
+    Form,
+    disk_errors,
+    load_lines,
+    put_aside,
+    write_bytes,
+    write_lines,
+)
 from iveg.domain.accounts import Access, AccessChange, Account, ApiToken, Session
 from iveg.domain.audit import CONSOLE
-from iveg.domain.errors import HopError
 from iveg.domain.records import Json
 
 _log = logging.getLogger(__name__)
@@ -46,9 +52,9 @@ class AccessFile:
     """The file and its writer.
 
     Attributes:
-        aside: Names of damaged files that nobody has taken away yet.
-        failing: Whether the disk refused it at the last time.
-        copied: Whether all that an earlier version had kept elsewhere is in it.
+        aside: Names of damaged files that still lie in the folder.
+        failing: Whether the last write failed.
+        copied: Whether it has all records that an earlier version kept elsewhere.
     """
 
     def __init__(self, path: Path) -> None:
@@ -62,7 +68,7 @@ class AccessFile:
 
     @property
     def exists(self) -> bool:
-        """Whether there is one, however damaged."""
+        """Whether the file exists, however damaged."""
         return self._path.exists()
 
     def beside(self, name: str) -> Path:
@@ -72,16 +78,16 @@ class AccessFile:
     # --- at the start -------------------------------------------------------------
 
     def load(self) -> Access:
-        """All that can be read; a damaged file is put aside."""
+        """All readable records; a damaged file is put aside."""
         self._look_aside()
         self._newest, is_whole = self.read()
         if self.exists and not is_whole:
-            self._put_aside("not as it was written")
+            self._put_aside("differs from what iVeg wrote")
         return self._newest
 
     def read(self) -> tuple[Access, bool]:
-        """All that can be read, and whether that is all that was written."""
-        found: dict[str, list[Any]] = {kind: [] for kind in _READ}
+        """All readable records, and whether the file is whole."""
+        rows: dict[str, list[Any]] = {kind: [] for kind in _READ}
         try:
             head, *lines = self._path.read_bytes().splitlines()
         except (OSError, ValueError):
@@ -90,32 +96,33 @@ class AccessFile:
         for number, line in enumerate(lines, 2):
             try:
                 kind, row = _row(line)
-                found[kind].append(row)
+                rows[kind].append(row)
             except ValueError:
-                _log.warning("%s, line %d: not readable", self._path, number)
+                _log.warning("%s, line %d: not readable, skipped", self._path, number)
                 is_whole = False
-        is_whole &= [count for count, _ in found["end"]] == [len(lines) - 1]
-        self.copied = self.exists and all(copied for _, copied in found["end"])
+        # The last line counts the others: a file that was cut short has none.
+        is_whole &= [count for count, _ in rows["end"]] == [len(lines) - 1]
+        self.copied = self.exists and all(copied for _, copied in rows["end"])
         access = Access(
-            tuple(found["account"]), tuple(found["token"]), tuple(found["session"])
+            tuple(rows["account"]), tuple(rows["token"]), tuple(rows["session"])
         )
         return access, is_whole
 
     # --- while iVeg runs ----------------------------------------------------------
 
     def save(self, access: Access) -> None:
-        """Write this to disk soon; returns at once. The newest call wins."""
+        """Write to disk soon; returns at once.  The newest call wins."""
         self._newest = access
         if not self._is_queued:
             self._is_queued = True
             self._writer.submit(self._write)
 
     async def look(self) -> None:
-        """Write the file anew where it is not as it was written, or was not."""
+        """Write the file anew where another program changed it, or a write failed."""
         await asyncio.wrap_future(self._writer.submit(self._look))
 
     def close(self) -> None:
-        """Return when the newest is on disk."""
+        """Return when the newest state is on disk."""
         self._writer.shutdown()
 
     def _look(self) -> None:
@@ -124,11 +131,11 @@ class AccessFile:
             self._write()
 
     def _look_aside(self) -> None:
-        found = self._path.parent.glob(f"{self._path.name}.damaged-*")
-        self.aside = sorted(path.name for path in found)
+        paths = self._path.parent.glob(f"{self._path.name}.damaged-*")
+        self.aside = sorted(path.name for path in paths)
 
     def _write(self) -> None:
-        # Before the newest is read: what is saved from here on queues the next writing.
+        # Cleared before the newest state is read: a later `save` queues another write.
         self._is_queued = False
         try:
             if self._is_foreign():
@@ -139,7 +146,7 @@ class AccessFile:
             )
             self.failing = False
         except OSError:
-            # Told once, until it works again: every request may come here.
+            # Logged once until the next success: every request may come here.
             if not self.failing:
                 _log.exception("%s could not be written", self._path)
             self.failing = True
@@ -152,7 +159,7 @@ class AccessFile:
             return
         ending = f"damaged-{datetime.now(UTC):%Y%m%dT%H%M%S.%f}"
         try:
-            # A name more, so that a crash before the next writing loses nothing.
+            # The file gets a second name: a crash before the next write loses nothing.
             os.link(self._path, f"{self._path}.{ending}")
             _log.error("%s: %s; a copy ends in %s", self._path, why, ending)
         except OSError:
@@ -160,7 +167,7 @@ class AccessFile:
         self._look_aside()
 
     def _is_foreign(self) -> bool:
-        """Whether another program has changed or taken away the file."""
+        """Whether another program has changed or removed the file."""
         try:
             return self._seen not in (None, _seen(self._path.stat()))
         except OSError:
@@ -168,6 +175,7 @@ class AccessFile:
 
     # --- changes of the console ---------------------------------------------------
 
+    @disk_errors()
     def leave(self, change: AccessChange) -> None:
         """Leave a change of the console for the server.
 
@@ -175,43 +183,38 @@ class AccessFile:
             HopError: the disk did not take it.
         """
         line = orjson.dumps({"change": change})
-        try:
-            write_bytes(self.beside(f"{self._path.name}.left-{new_id()}"), line)
-        except OSError as error:
-            raise HopError("disk", str(error)) from error
+        write_bytes(self.beside(f"{self._path.name}.left-{new_id()}"), line)
 
     def left(self) -> list[tuple[Path, AccessChange]]:
-        """Changes of the console that wait, the oldest first."""
-        found = []
+        """Changes of the console that wait, oldest first."""
+        changes = []
         for path in sorted(self._path.parent.glob(f"{self._path.name}.left-*")):
             if path.suffix.endswith((".new", ".unreadable")):
                 continue
             try:
                 _, change = _row(path.read_bytes())
-                found.append((path, replace(change, by=CONSOLE)))
+                changes.append((path, replace(change, by=CONSOLE)))
             except (OSError, ValueError, TypeError) as error:
                 put_aside(path, type(error).__name__)
-        return found
+        return changes
 
     async def drop(self, left: list[Path]) -> None:
-        """Delete changes that count, after what is on its way to disk is there."""
-        await asyncio.wrap_future(self._writer.submit(_unlink, left))
+        """Delete changes that were taken up, after the writes before are on disk."""
+        for path in left:
+            deletion = self._writer.submit(path.unlink, missing_ok=True)
+            await asyncio.wrap_future(deletion)
 
 
-def _unlink(files: list[Path]) -> None:
-    for path in files:
-        path.unlink(missing_ok=True)
-
-
-def _seen(found: os.stat_result) -> _Seen:
-    return found.st_ino, found.st_size, found.st_mtime_ns
+def _seen(status: os.stat_result) -> _Seen:
+    """Inode, size (bytes) and time of change, which tell a foreign change."""
+    return status.st_ino, status.st_size, status.st_mtime_ns
 
 
 _EARLIER_METHODS: Final = {"passkey": "password", "pin": "link", "tablet": "link"}
 
 
 def earlier_sessions(path: Path) -> tuple[Session, ...]:
-    """Sessions of earlier versions, which had a file of their own."""
+    """Sessions of earlier versions, which kept them in a file of their own."""
     fields = TypeAdapter(dict[str, Any])
 
     def read(line: bytes) -> Session:
@@ -234,7 +237,7 @@ def _lines(access: Access, copied: bool) -> list[Json]:
 
 
 def _row(line: bytes) -> tuple[str, Any]:
-    """Kind and row of a line; the checksum of earlier versions is left out.
+    """Kind and row of a line; the checksum of earlier versions is ignored.
 
     Raises:
         ValueError: it is no record.
@@ -243,7 +246,4 @@ def _row(line: bytes) -> tuple[str, Any]:
     kind = next(iter(entry), "") if isinstance(entry, dict) else ""
     if kind not in _READ:
         raise ValueError("no record")
-    row = _READ[kind].validate_json(orjson.dumps(entry[kind]), strict=True)
-    if isinstance(row, Session):
-        bytes.fromhex(row.digest)  # nobody finds a session by another digest
-    return kind, row
+    return kind, _READ[kind].validate_json(orjson.dumps(entry[kind]), strict=True)

@@ -1,7 +1,6 @@
-"""Admission of people and programs, each change by somebody.
+"""Admission of people and programs; each change names its author.
 
-What people and programs are given to come in with is returned once and stored nowhere:
-of it only a digest is kept.
+An invitation or a token is returned once.  Only its digest is stored.
 """
 
 import secrets
@@ -36,18 +35,16 @@ INVITED_S: Final = 3 * DAY_S
 
 
 class Admission:
-    """Changes who may come in.
+    """Changes of accounts and tokens.
 
     Args:
-        book: Where that is known.
-        by: Who changes it.
+        book: Holds accounts and tokens.
+        by: Author of the changes.
         now: This moment (Unix s).
     """
 
     def __init__(self, book: AccessBook, by: Actor, now: float) -> None:
-        self._book = book
-        self._by = by
-        self._now = now
+        self._book, self._by, self._now = book, by, now
 
     # --- people -------------------------------------------------------------------
 
@@ -61,8 +58,8 @@ class Admission:
         """Add an account; returns its invitation, too.
 
         Raises:
-            NotANameError: nobody may be called so.
-            NameTakenError: somebody is called so already.
+            NotANameError: the name is not allowed.
+            NameTakenError: another account has the name.
         """
         _refuse_name(name)
         account = Account(new_id(), name, role, ends_at=ends_at)
@@ -72,21 +69,21 @@ class Admission:
     def reset(
         self, account: Account, waits_s: float = INVITED_S
     ) -> tuple[str, Account]:
-        """Take a password away and invite again; sessions end.
+        """Remove a password and invite again; sessions end.
 
-        Whom the provider vouches for is let in again, and gets no invitation.
+        An account of the identity provider is let in again without an invitation.
         """
-        back = replace(account, disabled=False, since=self._now)
+        reopened = replace(account, disabled=False, since=self._now)
         if account.provider:
-            return "", self._change(back, "account_reset")
-        invitation, invited = self._invited(replace(back, password=""), waits_s)
+            return "", self._change(reopened, "account_reset")
+        invitation, invited = self._invited(replace(reopened, password=""), waits_s)
         return invitation, self._change(invited, "account_reset")
 
     def give_role(self, account: Account, role: PersonRole) -> Account:
         """Change a role; sessions end.
 
         Raises:
-            ProvidedAccountError: the provider gives it.
+            ProvidedAccountError: the identity provider gives the role.
         """
         if account.provider:
             raise ProvidedAccountError(account.name)
@@ -94,25 +91,25 @@ class Admission:
         return self._change(changed, "account_role")
 
     def disable(self, account: Account) -> Account:
-        """Shut somebody out; an invitation that waits is none any more."""
-        off = replace(account, disabled=True, invitation="")
-        return self._change(off, "account_disabled")
+        """Shut a person out; an open invitation no longer counts."""
+        disabled = replace(account, disabled=True, invitation="")
+        return self._change(disabled, "account_disabled")
 
     def give_password(self, account: Account, password: str) -> Account:
-        """Put a hash in the place of another; sessions that began before are over."""
+        """Replace the hash of a password; sessions that began before end."""
         changed = replace(account, password=password, since=self._now)
         return self._change(changed, "password_changed")
 
     def vouched(self, user: Account) -> Account:
-        """Let somebody in whom a provider vouches for, under the name that they had.
+        """Admit a person of the identity provider, under their name here.
 
-        Another role ends the sessions of the one before.
+        A changed role ends earlier sessions.
 
         Args:
-            user: As the provider says.
+            user: Account as the provider describes it.
 
         Raises:
-            SignOnError: they are shut out here, or there are too many accounts.
+            SignOnError: the person is shut out here, or there are too many accounts.
         """
         account = self._book.accounts.get(user.account_id)
         if account is None:
@@ -125,6 +122,7 @@ class Admission:
         return self._change(changed, "account_role")
 
     def _add_vouched(self, user: Account) -> Account:
+        # The provider decides how many people sign in, so that the bound stands here.
         if len(self._book.accounts) >= MOST_ACCOUNTS:
             raise SignOnError("busy", f"{MOST_ACCOUNTS} accounts are there already")
         marked = replace(user, name=another_name(user.name, user.account_id))
@@ -137,8 +135,8 @@ class Admission:
         return self._change(account, "account_added", ends_at=account.ends_at)
 
     def _change(self, account: Account, action: str, **details: object) -> Account:
-        told = {"role": account.role, **details}
-        self._book.apply(AccessChange(action, account, told, by=self._by))
+        facts = {"role": account.role, **details}
+        self._book.apply(AccessChange(action, account, facts, by=self._by))
         return account
 
     def _invited(self, account: Account, waits_s: float) -> tuple[str, Account]:
@@ -151,11 +149,11 @@ class Admission:
     def give_token(
         self, name: str, scope: TokenScope, ends_at: float | None = None
     ) -> tuple[str, ApiToken]:
-        """Let a program in by a token, which is returned here alone.
+        """Make a token for a program; its text is returned only here.
 
         Raises:
-            NotANameError: no program may be called so.
-            NameTakenError: one is called so already.
+            NotANameError: the name is not allowed.
+            NameTakenError: another token has the name.
         """
         _refuse_name(name)
         token = secrets.token_urlsafe(32)
@@ -168,8 +166,7 @@ class Admission:
 
     def revoke(self, token: ApiToken) -> None:
         """Delete a token."""
-        change = AccessChange("token_revoked", token, gone=True, by=self._by)
-        self._book.apply(change)
+        self._book.apply(AccessChange("token_revoked", token, gone=True, by=self._by))
 
 
 def _refuse_name(name: str) -> None:

@@ -1,12 +1,13 @@
-"""JSON over HTTP from a server that somebody has configured, and that may be hostile.
+"""JSON over HTTP from a server that an operator configured and that may be hostile.
 
-Time and size are bounded; redirects are followed nowhere, and a body comes as
-it is, so that no small one unpacks into a large one.
+Time and size are bounded.  Redirects are not followed, and bodies come uncompressed, so
+that no small body unpacks into a large one.
 """
 
 import asyncio
 import ssl
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from typing import Final
@@ -23,7 +24,7 @@ MOST_BYTES: Final = 256 * 1024
 
 @dataclass(frozen=True, slots=True)
 class JsonAnswer:
-    """Status and object of an answer; the object is empty where there is none."""
+    """Status and object of an answer; the object of a failure may be empty."""
 
     status: int
     body: Json
@@ -42,11 +43,11 @@ class JsonAnswer:
 
 
 class BoundedJson:
-    """Asks one server.
+    """HTTP to one server.
 
     Args:
-        hop: Names the server in errors.
-        timeout_s: For each exchange as a whole (s), however slowly it trickles.
+        hop: Name of the server in errors.
+        timeout_s: Time limit of a whole exchange (s), however slowly it trickles.
     """
 
     def __init__(self, hop: str, timeout_s: float = TIMEOUT_S) -> None:
@@ -61,43 +62,39 @@ class BoundedJson:
         """Close connections."""
         await self._client.aclose()
 
-    async def get(
-        self,
-        url: str,
-        query: Mapping[str, str] | None = None,
-        headers: Mapping[str, str] | None = None,
-    ) -> JsonAnswer:
-        """GET an object. Raises HopError."""
-        return await self._ask("GET", url, params=query, headers=headers)
-
     async def post(
         self,
         url: str,
         form: Mapping[str, str],
         login: tuple[str, str] | None = None,
     ) -> JsonAnswer:
-        """POST a form, with a user and password where there is a login.
+        """POST a form; ``login`` is a user and password, or None.
 
         Raises:
-            HopError: no answer in time, or none that is a JSON object of some size.
+            HopError: no answer in time, or none that is a JSON object within the size.
         """
         auth = None if login is None else httpx.BasicAuth(*login)
-        return await self._ask("POST", url, data=dict(form), auth=auth)
+        return await self.ask("POST", url, data=dict(form), auth=auth)
 
-    async def _ask(self, method: str, url: str, **what: object) -> JsonAnswer:
-        asked = {name: value for name, value in what.items() if value is not None}
+    async def ask(self, method: str, url: str, **parts: object) -> JsonAnswer:
+        """Request an object; ``parts`` of the request have their names in httpx.
+
+        Raises:
+            HopError: no answer in time, or none that is a JSON object within the size.
+        """
+        present = {name: part for name, part in parts.items() if part is not None}
         try:
             async with asyncio.timeout(self._timeout_s):
                 # mypy cannot follow arguments by name into the library.
-                async with self._client.stream(method, url, **asked) as answer:  # type: ignore[arg-type]
+                async with self._client.stream(method, url, **present) as answer:  # type: ignore[arg-type]
                     body = await self._read(answer)
         except (TimeoutError, httpx.TimeoutException) as error:
             detail = f"no answer in {self._timeout_s:g} s"
             raise NoAnswerError(self._hop, detail) from error
         except (httpx.HTTPError, httpx.InvalidURL, OSError, UnicodeError) as error:
-            # Of the address nothing: its query may hold a token.
-            why = type(error).__name__
-            raise HopError(self._hop, f"cannot be reached: {why}") from None
+            # Without the address: its query may hold a token.
+            reason = type(error).__name__
+            raise HopError(self._hop, f"cannot be reached: {reason}") from None
         return JsonAnswer(answer.status_code, self._object(answer.status_code, body))
 
     async def _read(self, answer: httpx.Response) -> bytes:
@@ -105,15 +102,13 @@ class BoundedJson:
         async for part in answer.aiter_raw():
             body += part
             if len(body) > MOST_BYTES:
-                detail = f"answered more than {MOST_BYTES} bytes"
-                raise HopError(self._hop, detail)
+                raise HopError(self._hop, f"answered more than {MOST_BYTES} bytes")
         return bytes(body)
 
     def _object(self, status: int, body: bytes) -> Json:
-        try:
+        document = None
+        with suppress(ValueError):
             document = orjson.loads(body)
-        except ValueError:
-            document = None
         if isinstance(document, dict):
             return document
         if 200 <= status < 300:
@@ -123,5 +118,5 @@ class BoundedJson:
 
 @cache
 def _believed() -> ssl.SSLContext:
-    """Certificates of this machine; reading them takes a while."""
+    """Trusted certificates of this machine, read once, since reading takes a while."""
     return ssl.create_default_context()

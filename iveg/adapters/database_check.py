@@ -1,4 +1,4 @@
-"""Whether the history's database can be used."""
+"""Check of the history's database."""
 
 from iveg.adapters.history.engine import revisions, sqlite_file
 from iveg.adapters.history.queries import ask_once
@@ -6,10 +6,10 @@ from iveg.domain.errors import HopError
 
 
 def check_database(database_url: str) -> None:
-    """Check that the history can be read and has the newest shape; change nothing.
+    """Check that the history can be read and has the newest schema; change nothing.
 
     Raises:
-        HopError: it is not there, cannot be read, or has another shape.
+        HopError: it is missing, cannot be read, or has another schema.
         SettingsError: the address cannot be used.
     """
     file = sqlite_file(database_url)
@@ -17,13 +17,12 @@ def check_database(database_url: str) -> None:
         raise HopError(
             "database", f"there is none at {file}; `iveg db upgrade` makes it"
         )
-    found, known = ask_once(database_url, revisions)
-    newest = known[0]
-    if found is not None and found not in known:
-        raise HopError("database", f"a newer iVeg wrote it (migration {found})")
-    if found != newest:
+    revision, known = ask_once(database_url, revisions)
+    if revision is not None and revision not in known:
+        raise HopError("database", f"a newer iVeg wrote it (migration {revision})")
+    if revision != known[0]:
         raise HopError(
             "database",
-            f"it is at migration {found or 'none'} and the newest is {newest}; "
+            f"it is at migration {revision or 'none'} and the newest is {known[0]}; "
             "`iveg db upgrade` mends that",
         )

@@ -1,16 +1,15 @@
 """DDS, the network of ROS 2: a participant and the endpoints on its domain.
 
-Uses Eclipse Cyclone DDS, an optional extra (``iveg[ros2]``), which nothing but this
-module imports.
-Payloads stay bytes here: DDS checks them against the type, and ``iveg.ros2.cdr`` reads
-the few that are wanted.  None of Cyclone's threads calls iVeg: readers are polled.
+Uses Eclipse Cyclone DDS, an optional extra (``iveg[ros2]``), which only this module
+imports.  Payloads stay bytes here: DDS checks them against the type, and
+``iveg.ros2.cdr`` reads the few that are needed.  None of Cyclone's threads calls iVeg:
+readers are polled.
 """
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from functools import cache
-from types import TracebackType
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from cyclonedds.builtin import (
     BuiltinDataReader,
@@ -48,10 +47,10 @@ _PLAIN = {"bool": bool, "string": str}
 
 @cache
 def announced(ros: str) -> type[IdlStruct]:
-    """The type that DDS announces for a message, with all within it.
+    """The type that DDS announces for a message, with its nested types.
 
-    Its samples stay bytes: Cyclone's reader and writer ask a type to deserialize and
-    serialize them, and a base of ours would be announced with it.
+    Its samples stay bytes: Cyclone's reader and writer call the type to deserialize
+    and serialize them.  A base class of ours would be announced with it.
     """
 
     def idl(kind: Any) -> Any:
@@ -66,9 +65,9 @@ def announced(ros: str) -> type[IdlStruct]:
                 return _PLAIN.get(name) or getattr(types, name)
 
     def deserialize(cls: type[IdlStruct], data: bytes, /, **_: object) -> IdlStruct:
-        made = cls()
-        made.payload = data
-        return made
+        type_ = cls()
+        type_.payload = data
+        return type_
 
     _, fields = STORE.fielddefs[ros]
     members = {name: idl(kind) for name, kind in fields}
@@ -81,7 +80,7 @@ def announced(ros: str) -> type[IdlStruct]:
 
 
 def write_qos(qos: Qos) -> DdsQos:
-    """A quality of service in Cyclone's words, and what ROS 2 adds to each."""
+    """A quality of service as Cyclone's, with the policies that ROS 2 adds to each."""
     reliability = (
         Policy.Reliability.Reliable(duration(milliseconds=100))
         if qos.reliable
@@ -97,29 +96,22 @@ def write_qos(qos: Qos) -> DdsQos:
         reliability,
         durability,
         history,
-        # A late reader gets as many as an early one could have kept.
+        # A late reader gets as many samples as an early one could have kept.
         Policy.DurabilityService(0, history, -1, -1, -1),
         # ROS 2 sends and takes plain CDR of version 1.
         Policy.DataRepresentation(use_cdrv0_representation=True),
-        # Its endpoints name the members of a type freely, or give no type.
+        # ROS 2 endpoints name the members of a type freely, or give no type.
         Policy.TypeConsistency.AllowTypeCoercion(ignore_member_names=True),
     )
 
 
 def read_qos(qos: DdsQos) -> Qos:
-    """The quality of service that another program announces, in our words."""
-    history = qos[Policy.History]
+    """The quality of service that another program announces, as ours."""
     return Qos(
         isinstance(qos[Policy.Reliability], Policy.Reliability.Reliable),
         qos[Policy.Durability] != Policy.Durability.Volatile,
-        getattr(history, "depth", 0),
+        getattr(qos[Policy.History], "depth", 0),
     )
-
-
-def user_data_of(qos: DdsQos) -> tuple[str, str]:
-    """Type hash and gate in an endpoint's user data; empty where it has none."""
-    policy = qos[Policy.Userdata]
-    return read_user_data(b"" if policy is None else bytes(policy.data))
 
 
 # --- endpoints ----------------------------------------------------------------------
@@ -129,88 +121,93 @@ def user_data_of(qos: DdsQos) -> tuple[str, str]:
 MOST_TAKEN = 200
 
 
-def _count(matched: Callable[[], list[int]]) -> int:
-    """Number of the other side's; Cyclone's Python fails where one joins meanwhile."""
+@contextmanager
+def _dds_errors() -> Iterator[None]:
+    """Raise a refusal of DDS as HopError; around a block or a function."""
     try:
-        return len(matched())
-    except IndexError:
-        return _count(matched)
+        yield
     except DDSException as error:
         raise HopError("dds", error.msg) from error
 
 
-class DdsReader:
+def _count(matched: Callable[[], list[int]]) -> int:
+    """Number of matched endpoints of other programs."""
+    # Cyclone's Python raises IndexError where an endpoint joins during the call.
+    try:
+        with _dds_errors():
+            return len(matched())
+    except IndexError:
+        return _count(matched)
+
+
+_Entity = TypeVar("_Entity", DataReader, DataWriter)
+
+
+class _Endpoint(Generic[_Entity]):
+    """Own endpoint, until it is closed."""
+
+    def __init__(self, entity: _Entity) -> None:
+        self._entity: _Entity | None = entity
+
+    @property
+    def entity(self) -> _Entity:
+        """Cyclone's entity.
+
+        Raises:
+            HopError: the endpoint is closed.
+        """
+        if self._entity is None:
+            raise HopError("dds", "closed")
+        return self._entity
+
+    def close(self) -> None:
+        """Drop Cyclone's entity, which ends with its last reference."""
+        self._entity = None
+
+
+class DdsReader(_Endpoint[DataReader]):
     """A subscription."""
 
     def __init__(self, reader: DataReader, depth: int) -> None:
-        self._reader: DataReader | None = reader
+        super().__init__(reader)
         self._depth = depth
 
+    @_dds_errors()
     def take(self) -> list[bytes]:
         """Every waiting message, oldest first.
 
         Raises:
             HopError: DDS refuses.
         """
-        try:
-            found = self.entity.take(self._depth)
-        except DDSException as error:
-            raise HopError("dds", error.msg) from error
-        return [sample.payload for sample in found if sample.sample_info.valid_data]
-
-    @property
-    def entity(self) -> DataReader:
-        """Cyclone's.
-
-        Raises:
-            HopError: closed.
-        """
-        if self._reader is None:
-            raise HopError("dds", "closed")
-        return self._reader
+        samples = self.entity.take(self._depth)
+        return [sample.payload for sample in samples if sample.sample_info.valid_data]
 
     @property
     def writers(self) -> int:
         """Number of writers that serve it."""
         return _count(self.entity.get_matched_publications)
 
-    def close(self) -> None:
-        """Let go of Cyclone's entity."""
-        self._reader = None
 
-
-class DdsWriter:
+class DdsWriter(_Endpoint[DataWriter]):
     """A publication."""
 
     def __init__(self, writer: DataWriter, topic: Topic) -> None:
-        self._writer: DataWriter | None = writer
+        super().__init__(writer)
         self._kind: type[IdlStruct] = topic.data_type
 
+    @_dds_errors()
     def write(self, payload: bytes) -> None:
         """Send a message with its encapsulation.
 
         Raises:
             HopError: DDS refuses, or closed.
         """
-        try:
-            self._entity.write(self._kind.deserialize(payload))
-        except DDSException as error:
-            raise HopError("dds", error.msg) from error
-
-    @property
-    def _entity(self) -> DataWriter:
-        if self._writer is None:
-            raise HopError("dds", "closed")
-        return self._writer
+        self.entity.write(self._kind.deserialize(payload))
 
     @property
     def readers(self) -> int:
         """Number of readers that it serves."""
-        return _count(self._entity.get_matched_subscriptions)
-
-    def close(self) -> None:
-        """Let go of Cyclone's entity."""
-        self._writer = None
+        return _count(self.entity.get_matched_subscriptions)
 
 
 # --- a participant ------------------------------------------------------------------
@@ -223,11 +220,11 @@ class Dds(AbstractContextManager["Dds"]):
     """One participant of a domain; use it with ``with``.
 
     Args:
-        network: Where.
-        gate: Id of the robot whose gate it is; every endpoint carries it.
+        network: Domain, interface and peers.
+        gate: Id of the robot whose gate this is; every endpoint carries it.
 
     Raises:
-        HopError: no participant can be made there.
+        HopError: no participant can be made on the network.
     """
 
     def __init__(self, network: DdsNetwork, gate: str = "") -> None:
@@ -241,23 +238,15 @@ class Dds(AbstractContextManager["Dds"]):
         except DDSException as error:
             detail = f"no participant on domain {network.domain}: {error.msg}"
             raise HopError("dds", detail) from error
-        # A peer that is switched off fails a hundred times in two seconds, each a line.
+        # A peer that is switched off makes a hundred lines of log in two seconds.
         load_cyclonedds().dds_set_log_mask(_FATAL)
         self._guid = str(self._participant.guid)
         self._discovery = [
-            (BuiltinDataReader(self._participant, topic), writes)
-            for topic, writes in (
-                (BuiltinTopicDcpsPublication, True),
-                (BuiltinTopicDcpsSubscription, False),
-            )
+            (BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication), True),
+            (BuiltinDataReader(self._participant, BuiltinTopicDcpsSubscription), False),
         ]
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Leave; nothing is called afterwards."""
         # Cyclone deletes an entity with its last reference, the participant last.
         for endpoint in self._own:
@@ -271,70 +260,69 @@ class Dds(AbstractContextManager["Dds"]):
 
     def reader(self, name: str, message: type[Message], qos: Qos) -> DdsReader:
         """Subscribe to a topic by its full ROS name."""
-        policies = self._policies(message, qos)
-        topic = self._topic(name, message)
-        made = DdsReader(DataReader(self._participant, topic, policies), qos.depth)
-        self._own.append(made)
-        return made
+        topic, policies = self._announced(name, message, qos)
+        reader = DdsReader(DataReader(self._participant, topic, policies), qos.depth)
+        self._own.append(reader)
+        return reader
 
     def writer(self, name: str, message: type[Message], qos: Qos) -> DdsWriter:
         """Publish on a topic by its full ROS name."""
-        topic = self._topic(name, message)
-        policies = self._policies(message, qos)
-        made = DdsWriter(DataWriter(self._participant, topic, policies), topic)
-        self._own.append(made)
-        return made
+        topic, policies = self._announced(name, message, qos)
+        writer = DdsWriter(DataWriter(self._participant, topic, policies), topic)
+        self._own.append(writer)
+        return writer
 
-    def _policies(self, message: type[Message], qos: Qos) -> DdsQos:
-        data = Policy.Userdata(user_data(message, self._gate))
-        return DdsQos(data, base=write_qos(qos))
-
-    def _topic(self, name: str, message: type[Message]) -> Topic:
+    def _announced(
+        self, name: str, message: type[Message], qos: Qos
+    ) -> tuple[Topic, DdsQos]:
+        """Topic and policies of an endpoint."""
         kind = announced(message.ROS)
         if (name, kind) not in self._topics:
-            made = Topic(self._participant, dds_topic(name), kind)
-            self._topics[name, kind] = made
-        return self._topics[name, kind]
+            self._topics[name, kind] = Topic(self._participant, dds_topic(name), kind)
+        data = Policy.Userdata(user_data(message, self._gate))
+        return self._topics[name, kind], DdsQos(data, base=write_qos(qos))
 
     # --- endpoints of others ------------------------------------------------------
 
     def endpoints(self) -> tuple[Endpoint, ...]:
-        """All ROS writers and readers on the domain, this participant's among them.
+        """All ROS writers and readers on the domain, with this participant's own.
 
-        Those that came and went since the last call are told once.
+        Endpoints that came and went since the last call are listed once.
         """
-        gone: list[Endpoint] = []
+        ended: list[Endpoint] = []
         for reader, writes in self._discovery:
             for sample in reader.take(MOST_TAKEN):
-                key, found = str(sample.key), self._endpoint(sample, writes)
+                key, endpoint = str(sample.key), self._endpoint(sample, writes)
                 known = self._endpoints.pop(key, None)
-                if found is None:
+                if endpoint is None:
                     continue
                 if sample.sample_info.instance_state == InstanceState.Alive:
-                    self._endpoints[key] = found
+                    self._endpoints[key] = endpoint
                 elif known is None:
-                    gone.append(found)
-        return *self._endpoints.values(), *gone
+                    ended.append(endpoint)
+        return *self._endpoints.values(), *ended
 
     def _endpoint(self, sample: DcpsEndpoint, writes: bool) -> Endpoint | None:
-        # An invalid sample tells the end of an endpoint and nothing about it.
+        # An invalid sample reports the end of an endpoint, without its topic.
         topic = ros_topic(sample.topic_name or "")
         if topic is None:
             return None
+        policy = sample.qos[Policy.Userdata]
         return Endpoint(
             topic,
             ros_type(sample.type_name),
             writes,
             read_qos(sample.qos),
             str(sample.participant_key) == self._guid,
-            *user_data_of(sample.qos),
+            # Type hash and gate; empty where it has none.
+            *read_user_data(b"" if policy is None else bytes(policy.data)),
         )
 
 
 # --- Cyclone's side ----------------------------------------------------------------
 
 _configured: dict[int, tuple[str, Domain]] = {}
-"""Cyclone takes one configuration a domain and process, at its first participant."""
+"""Configuration of each domain, which Cyclone takes at the first participant alone."""
 
 
 def _configure(network: DdsNetwork) -> None:

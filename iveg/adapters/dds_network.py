@@ -1,4 +1,4 @@
-"""The network that DDS runs on, as Cyclone is configured for it."""
+"""Network of DDS, and Cyclone's configuration for it."""
 
 import socket
 import struct
@@ -11,13 +11,13 @@ from xml.sax.saxutils import quoteattr
 from iveg.domain.errors import HopError
 
 _LEASE = "3 s"
-"""Time that others remember a participant that died without a word."""
-_ASKED_EVERY = "2 s"
-"""Time between two announcements of ours, and two questions to silent peers."""
+"""Time after which others forget a participant that died silently."""
+_ANNOUNCED_EVERY = "2 s"
+"""Time between two announcements, also to silent peers."""
 _ASIDE = 'multicast="true" priority="-1"'
-"""For loopback: Cyclone would ask peers on other hosts from its first choice."""
+"""Attributes of loopback: Cyclone announces to other hosts from its first choice."""
 _MOST_PARTICIPANTS = 119
-"""As many as a domain has ports for on one machine."""
+"""Participants for which a domain has ports on one machine."""
 _MOST_INTERFACES = 4
 """Cyclone refuses more."""
 _LOOPBACK = "127.0.0.1"
@@ -29,13 +29,13 @@ _UP = 1
 class DdsNetwork:
     """Domain, interface and peers of the network.
 
-    Loopback is always used, and asked one by one like a peer: nodes may be bound to it.
+    Loopback is always used, and always a peer, as nodes may be bound to it.
 
     Attributes:
         domain: 0 to 232, as ``ROS_DOMAIN_ID``.
-        interface: The only one beside loopback, by name or address; empty: all.
-        peers: Addresses to ask one by one, where multicast does not pass.
-        uri: What ``CYCLONEDDS_URI`` says; counts where nothing above does.
+        interface: The only interface beside loopback, by name or address; empty: all.
+        peers: Addresses announced to one by one, where multicast does not pass.
+        uri: Value of ``CYCLONEDDS_URI``; counts where nothing above does.
     """
 
     domain: int = 0
@@ -57,7 +57,7 @@ class DdsNetwork:
         return {} if self.uri else _addresses()
 
     def config(self) -> str:
-        """Cyclone's configuration, one fragment after the other.
+        """Cyclone's configuration: ``uri`` and our own fragment, which counts more.
 
         Raises:
             HopError: the interface, or an address of a peer, does not exist.
@@ -66,15 +66,14 @@ class DdsNetwork:
 
     def _own(self) -> str:
         general = discovery = ""
-        found = self.interfaces()
-        if self.interface and self.interface not in (*found, *found.values()):
+        chosen = self.interfaces()
+        if self.interface and self.interface not in (*chosen, *chosen.values()):
             there = ", ".join(_addresses())
-            detail = f"no interface {self.interface}; there are {there}"
-            raise HopError("dds", detail)
+            raise HopError("dds", f"no interface {self.interface}; there are {there}")
         used = "".join(
             f"<NetworkInterface name={quoteattr(name)}"
             f" {_ASIDE * _is_loopback(address)}/>"
-            for name, address in used_of(found).items()
+            for name, address in usable_interfaces(chosen).items()
         )
         if used:
             general = f"<Interfaces>{used}</Interfaces>"
@@ -83,23 +82,23 @@ class DdsNetwork:
             discovery = (
                 "<ParticipantIndex>auto</ParticipantIndex>"
                 f"<MaxAutoParticipantIndex>{_MOST_PARTICIPANTS}"
-                f"</MaxAutoParticipantIndex><Peers>{self._asked()}</Peers>"
+                f"</MaxAutoParticipantIndex><Peers>{self._peer_tags()}</Peers>"
             )
         discovery += (
             f"<LeaseDuration>{_LEASE}</LeaseDuration>"
-            f"<SPDPInterval>{_ASKED_EVERY}</SPDPInterval>"
+            f"<SPDPInterval>{_ANNOUNCED_EVERY}</SPDPInterval>"
         )
         return (
             f'<CycloneDDS><Domain Id="any"><General>{general}</General>'
             f"<Discovery>{discovery}</Discovery></Domain></CycloneDDS>"
         )
 
-    def _asked(self) -> str:
-        """Peers, asked for ever: Cyclone forgets one that is silent for 30 s."""
+    def _peer_tags(self) -> str:
+        """Peers for ever: by itself Cyclone forgets a peer that is silent for 30 s."""
         for peer in self.peers:
             host = peer.partition(":")[0] if peer.count(":") == 1 else peer
             try:
-                # Cyclone aborts the process for an unknown one.
+                # Cyclone aborts the process for an unknown host.
                 socket.gethostbyname(host)
             except OSError as error:
                 raise HopError("dds", f"peer {peer}: {error.strerror}") from error
@@ -109,10 +108,10 @@ class DdsNetwork:
         )
 
 
-def used_of(interfaces: dict[str, str]) -> dict[str, str]:
-    """Those that Cyclone uses: loopback, and hardware before bridges and tunnels.
+def usable_interfaces(interfaces: dict[str, str]) -> dict[str, str]:
+    """Interfaces for Cyclone: hardware before bridges and tunnels, and loopback.
 
-    Loopback is last, as Cyclone asks peers from the first.
+    Loopback is last, as Cyclone announces to peers from the first.
     """
     here = [name for name in interfaces if _is_loopback(interfaces[name])][:1]
     others = sorted(
@@ -129,13 +128,13 @@ def _is_loopback(address: str) -> bool:
 
 def _addresses() -> dict[str, str]:
     """IPv4 address of each interface of this machine that is up and has one."""
-    found: dict[str, str] = {}
+    addresses: dict[str, str] = {}
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         for _, name in socket.if_nameindex():
-            # An interface may go between two questions.
+            # An interface may vanish between two calls.
             with suppress(OSError):
                 flags = Path("/sys/class/net", name, "flags").read_text("ascii")
                 answer = ioctl(probe, _SIOCGIFADDR, struct.pack("40s", name.encode()))
                 if int(flags, 16) & _UP:
-                    found[name] = socket.inet_ntoa(answer[20:24])
-    return found
+                    addresses[name] = socket.inet_ntoa(answer[20:24])
+    return addresses

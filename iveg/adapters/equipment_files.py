@@ -3,13 +3,9 @@
 from collections.abc import Sequence
 from typing import Annotated, Self
 
-from pydantic import (
-    AfterValidator,
-    Field,
-    model_validator,
-)
+from pydantic import Field, model_validator
 
-from iveg.adapters.toml_files import Table, complaint, read_table, read_text
+from iveg.adapters.toml_files import Table, complaint, must, read_table, read_text
 from iveg.domain.equipment import UNITS, Limit, Tile, contradiction
 from iveg.domain.fleet import is_robot_id
 from iveg.ngsi import names
@@ -21,14 +17,14 @@ _FARTHEST_M = 1e6
 
 
 def load_equipment(name_or_file: str, robots: Sequence[str] = ()) -> tuple[Tile, ...]:
-    """The tiles of a file, or of ``demo``; none of an empty name.
+    """Tiles of a file, or of ``demo``; none for an empty name.
 
     Args:
-        name_or_file: What the setting says.
-        robots: The fleet, whose entities and devices are no equipment's.
+        name_or_file: Value of the setting.
+        robots: The fleet, whose entities and devices no tile may name.
 
     Raises:
-        DataFileError: the file cannot be used; it says file and key.
+        DataFileError: the file cannot be used; it names file and key.
     """
     if not name_or_file:
         return ()
@@ -44,8 +40,7 @@ def read_equipment(
     Raises:
         DataFileError: naming file, key and reason.
     """
-    page = read_table(text, file, _FileTable)
-    tiles = tuple(row.value() for row in page.tiles)
+    tiles = tuple(row.value() for row in read_table(text, file, _FileTable).tiles)
     wrong = contradiction(tiles) or _taken(tiles, robots)
     if wrong is not None:
         index, key, reason = wrong
@@ -65,30 +60,7 @@ def _taken(tiles: Sequence[Tile], robots: Sequence[str]) -> tuple[int, str, str]
 # --- the shape of the file --------------------------------------------------------
 
 
-def _known_unit(text: str) -> str:
-    if text not in UNITS:
-        raise ValueError(f"must be one of {', '.join(UNITS)}")
-    return text
-
-
-def _free_device(text: str) -> str:
-    if not is_robot_id(text):
-        raise ValueError("must be 1 to 64 letters, digits and hyphens, and not iVeg's")
-    return text
-
-
-def _other_type(text: str) -> str:
-    if text in (names.ROBOT_TYPE, names.HEARTBEAT_TYPE):
-        raise ValueError(f"{text} is no equipment: robots have sensors of their own")
-    return text
-
-
-def _other_entity(text: str) -> str:
-    if text == names.CLIMATE_ID:
-        raise ValueError("the climate has its tiles already")
-    return text
-
-
+_ROBOTS_AND_PROBE = names.ROBOT_TYPE, names.HEARTBEAT_TYPE
 # What NGSI-v2 allows in ids, types and names of attributes.
 _Word = Annotated[str, Field(pattern=r"""^[^\s<>"'=;()&?/#]{1,128}$""")]
 _Name = Annotated[str, Field(min_length=1, max_length=48)]
@@ -106,11 +78,24 @@ class _Place(Table):
 
 
 class _Tile(Table):
-    entity_id: Annotated[_Word, AfterValidator(_other_entity), Field(alias="entity")]
-    entity_type: Annotated[_Word, AfterValidator(_other_type), Field(alias="type")]
+    entity_id: Annotated[
+        _Word,
+        must(
+            lambda text: text != names.CLIMATE_ID, "the climate has its tiles already"
+        ),
+        Field(alias="entity"),
+    ]
+    entity_type: Annotated[
+        _Word,
+        must(
+            lambda text: text not in _ROBOTS_AND_PROBE,
+            "{} is no equipment: robots have sensors of their own",
+        ),
+        Field(alias="type"),
+    ]
     attribute: _Word
     name: _Names
-    unit: Annotated[str, AfterValidator(_known_unit)]
+    unit: Annotated[str, must(UNITS.__contains__, f"must be one of {', '.join(UNITS)}")]
     decimals: Annotated[int, Field(ge=0, le=4)] = 1
     low_low: float | None = None
     low: float | None = None
@@ -120,7 +105,12 @@ class _Tile(Table):
     silent_after_s: Annotated[float, Field(ge=1, le=604_800)] = 300.0
     has_trend: Annotated[bool, Field(alias="trend")] = True
     place: _Place | None = None
-    device: Annotated[str, AfterValidator(_free_device)] = ""
+    device: Annotated[
+        str,
+        must(
+            is_robot_id, "must be 1 to 64 letters, digits and hyphens, and not iVeg's"
+        ),
+    ] = ""
 
     @model_validator(mode="after")
     def _limits_rise(self) -> Self:
@@ -130,13 +120,13 @@ class _Tile(Table):
         return self
 
     def _limits(self) -> dict[Limit, float]:
-        found = {name: getattr(self, name) for name in _LIMITS}
-        return {name: one for name, one in found.items() if one is not None}
+        limits = {name: getattr(self, name) for name in _LIMITS}
+        return {name: limit for name, limit in limits.items() if limit is not None}
 
     def value(self) -> Tile:
         place = None if self.place is None else (self.place.x, self.place.y)
-        alike = self.model_dump(exclude={*_LIMITS, "place"})
-        return Tile(**alike, limits=self._limits(), place=place)
+        fields = self.model_dump(exclude={*_LIMITS, "place"})
+        return Tile(**fields, limits=self._limits(), place=place)
 
 
 class _FileTable(Table):

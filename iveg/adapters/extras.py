@@ -1,8 +1,8 @@
 """Libraries that only some commands need: the extras of the package (pyproject.toml).
 
 A site that runs ``iveg serve`` on a real FIWARE installs neither a driver of
-PostgreSQL nor DDS.  A command that needs one asks here first, so that all of them say
-in the same words what is missing.
+PostgreSQL nor DDS.  A command that needs one checks here first, so that all report a
+missing library in the same words.
 """
 
 from importlib.util import find_spec
@@ -13,25 +13,20 @@ from iveg.domain.errors import MissingExtraError
 EXTRAS: Final = {
     "postgresql": "psycopg",
     "ros2": "cyclonedds",
-    "sso": "authlib",
+    "sso": "httpx2",
 }
-"""Extra → the module of the library that it brings."""
-
-
-def has_extra(extra: str) -> bool:
-    """Whether the library of an extra is installed; it is not imported."""
-    return find_spec(EXTRAS[extra]) is not None
+"""Extra → module of its library; of several libraries the one added last."""
 
 
 def require_extra(extra: str, what: str) -> None:
-    """Go on only where the library of an extra is installed; it is not imported.
+    """Check that the library of an extra is installed, without importing it.
 
     Args:
-        extra: One of ``EXTRAS``.
-        what: What needs it, in words: a command, an option or a setting.
+        extra: A key of ``EXTRAS``.
+        what: Command, option or setting that needs it, in words.
 
     Raises:
-        MissingExtraError: it is not.
+        MissingExtraError: it is not installed.
     """
-    if not has_extra(extra):
+    if find_spec(EXTRAS[extra]) is None:
         raise MissingExtraError(what, EXTRAS[extra], extra)

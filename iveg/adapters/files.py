@@ -1,8 +1,8 @@
 """iVeg's own files, which are on the disk whole or not at all; locks, room, priority.
 
 A file of JSON lines begins with a line that names its content and version; a file
-without that line is of version 0.  One of a newer iVeg is refused, and one that cannot
-be read is put aside.
+without that line is of version 0.  A file of a newer iVeg is refused, and a file that
+cannot be read is put aside.
 """
 
 import asyncio
@@ -25,7 +25,7 @@ from iveg.domain.retention import DiskSpace
 
 
 def disk_space(directory: Path) -> DiskSpace:
-    """Room on the disk of a directory.
+    """Free and total space of a directory's disk.
 
     Raises:
         OSError: it cannot be read.
@@ -40,15 +40,15 @@ _FIRST_TO_GO = "1000"
 
 
 def give_way() -> None:
-    """Let this process run where others leave room.
+    """Give this process a lower priority than the server.
 
-    Its priority is so much lower (nice), and on Linux it is a batch: one that wakes
-    takes no other's place on a processor (sched(7), ``SCHED_BATCH``).  Where memory
-    runs out the kernel ends it, and not the server (proc_pid_oom_score_adj(5)).
+    Its niceness rises, and on Linux it is a batch process, which takes no other's
+    place on a processor when it wakes (sched(7), ``SCHED_BATCH``).  Where memory runs
+    out the kernel ends it, and not the server (proc_pid_oom_score_adj(5)).
     """
     os.nice(LESS_URGENT)
     if hasattr(os, "SCHED_BATCH"):
-        # Some containers allow no change; being late is all that is lost.
+        # Some containers allow no change; then this process is only less polite.
         with contextlib.suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
     with contextlib.suppress(OSError):
@@ -59,7 +59,7 @@ _log = logging.getLogger(__name__)
 
 _OWNER_ALONE = 0o600
 RESERVE_BYTES = 2**20
-"""Taken from the disk ahead for a file that a full disk must not end."""
+"""Space reserved on the disk, for a file that must survive a full disk."""
 _T = TypeVar("_T")
 
 
@@ -72,14 +72,14 @@ class Form:
 
     @property
     def line(self) -> bytes:
-        """As it stands in the file."""
+        """The first line of the file."""
         return orjson.dumps({"iveg": self.name, "version": self.version}) + b"\n"
 
 
 def write_lines(path: Path, form: Form, values: Iterable[object]) -> os.stat_result:
     """Replace a file; a reader finds the old or the new one, never a part.
 
-    Returns what the file is, as long as nobody else changes it.
+    Returns the status of the new file, to recognise later changes.
 
     Raises:
         OSError: the disk did not take it; the old file stands.
@@ -88,16 +88,23 @@ def write_lines(path: Path, form: Form, values: Iterable[object]) -> os.stat_res
     return write_bytes(path, form.line + b"".join(lines))
 
 
+@contextmanager
+def disk_errors(hop: str = "disk") -> Iterator[None]:
+    """Raise a refusal of the disk as HopError; around a block or a function."""
+    try:
+        yield
+    except OSError as error:
+        raise HopError(hop, error.strerror or str(error)) from error
+
+
 async def save_lines(path: Path, form: Form, values: Iterable[object]) -> None:
     """Replace a file in a thread; returns when it is on disk.
 
     Raises:
         HopError: the disk did not take it; the old file stands.
     """
-    try:
+    with disk_errors():
         await asyncio.to_thread(write_lines, path, form, values)
-    except OSError as error:
-        raise HopError("disk", str(error)) from error
 
 
 def write_bytes(path: Path, content: bytes) -> os.stat_result:
@@ -106,31 +113,31 @@ def write_bytes(path: Path, content: bytes) -> os.stat_result:
     Raises:
         OSError: the disk did not take it; the old file stands.
     """
-    beside = path.with_name(path.name + ".new")
-    beside.unlink(missing_ok=True)
+    temporary = path.with_name(path.name + ".new")
+    temporary.unlink(missing_ok=True)
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
     try:
-        with os.fdopen(os.open(beside, flags, _OWNER_ALONE), "wb") as file:
+        with os.fdopen(os.open(temporary, flags, _OWNER_ALONE), "wb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-            written = os.fstat(file.fileno())
-        beside.replace(path)
+            status = os.fstat(file.fileno())
+        temporary.replace(path)
     except OSError:
-        # A full disk needs each byte.
-        beside.unlink(missing_ok=True)
+        # A part of a file would only fill the disk further.
+        temporary.unlink(missing_ok=True)
         raise
     directory = os.open(path.parent, os.O_RDONLY)
     try:
-        # Else the move itself may be lost with the power.
+        # Without a sync of the folder a power cut may undo the move.
         os.fsync(directory)
     finally:
         os.close(directory)
-    return written
+    return status
 
 
 def read_lines(path: Path, form: Form) -> Iterator[tuple[int, bytes]]:
-    """Every line but the first and empty ones, with its number; none without a file.
+    """Numbered lines of a file after its first, empty lines left out; none: no file.
 
     Raises:
         DataFileError: it is something else, or a newer iVeg wrote it.
@@ -149,7 +156,7 @@ def read_lines(path: Path, form: Form) -> Iterator[tuple[int, bytes]]:
 
 
 def load_lines(path: Path, form: Form, read: Callable[[bytes], _T]) -> list[_T]:
-    """The values of a file; one with a line that cannot be read is put aside whole."""
+    """Values of a file; a file with an unreadable line is put aside whole."""
     try:
         return [read(line) for _, line in read_lines(path, form)]
     except (ValidationError, DataFileError, OSError) as error:
@@ -158,11 +165,10 @@ def load_lines(path: Path, form: Form, read: Callable[[bytes], _T]) -> list[_T]:
 
 
 def _is_head(path: Path, form: Form, line: bytes) -> bool:
-    """Whether the first line says what the file is."""
-    try:
+    """Whether the first line names content and version of the file."""
+    head = None
+    with contextlib.suppress(orjson.JSONDecodeError):
         head = orjson.loads(line)
-    except orjson.JSONDecodeError:
-        return False
     if not isinstance(head, dict) or "iveg" not in head:
         return False
     name, version = head["iveg"], head.get("version")
@@ -175,21 +181,21 @@ def _is_head(path: Path, form: Form, line: bytes) -> bool:
 
 
 def put_aside(path: Path, why: str, ending: str = "unreadable") -> bool:
-    """Rename a damaged file, so that it can be looked at; whether that was possible."""
-    aside = path.with_name(f"{path.name}.{ending}")
+    """Rename a damaged file, so that a person can examine it; returns the success."""
+    new_path = path.with_name(f"{path.name}.{ending}")
     try:
-        path.replace(aside)
+        path.replace(new_path)
     except OSError as error:
-        _log.error("%s: %s; it stays as it is: %s", path, why, error)
+        _log.error("%s: %s; cannot be put aside: %s", path, why, error)
         return False
-    _log.error("%s: %s; it is put aside as %s", path, why, aside.name)
+    _log.error("%s: %s; put aside as %s", path, why, new_path.name)
     return True
 
 
 def make_private(path: Path) -> None:
-    """Let nobody else read a file, which is made where it is missing.
+    """Let only the owner read a file; a missing file is made.
 
-    One that is there is not opened: closing it would drop SQLite's locks on it.
+    A file that exists is not opened: closing it would drop SQLite's locks on it.
 
     Raises:
         OSError: it cannot be made.
@@ -197,7 +203,7 @@ def make_private(path: Path) -> None:
     try:
         os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, _OWNER_ALONE))
     except FileExistsError:
-        # It may belong to somebody else, who chose who reads it.
+        # Another owner decides who reads the file.
         with contextlib.suppress(PermissionError):
             path.chmod(_OWNER_ALONE)
 
@@ -205,11 +211,11 @@ def make_private(path: Path) -> None:
 class ReservedFile:
     """A file that grows by lines, each on the disk before ``append`` returns.
 
-    Room for lines to come is taken from the disk ahead, as zeros behind the last line:
-    a disk that is full later does not end it.
+    Space for future lines is reserved on the disk, as zeros behind the last line:
+    a disk that is full later does not stop it.
 
     Attributes:
-        size: Bytes of its lines, once it is open.
+        size: Size of its lines (bytes), once it is open.
     """
 
     def __init__(self, path: Path, form: Form) -> None:
@@ -219,10 +225,10 @@ class ReservedFile:
         self._descriptor: int | None = None
         self._room = 0
         self._is_torn = False
-        """The last line may be half written: the next one must not be glued to it."""
+        """Whether the last line may be half written; then a line break comes first."""
 
     def open(self) -> int:
-        """Open it, made where it is missing, and take its reserve from the disk.
+        """Open or make the file, and take its reserve from the disk.
 
         Raises:
             OSError: it cannot be opened; likewise below.
@@ -245,11 +251,12 @@ class ReservedFile:
         if self._is_torn:
             lines = b"\n" + lines
         try:
-            written = os.pwrite(descriptor, lines, self.size)
+            size = os.pwrite(descriptor, lines, self.size)
             os.fsync(descriptor)
-            if written != len(lines):
-                raise OSError(f"{written} of {len(lines)} bytes written")
+            if size != len(lines):
+                raise OSError(f"{size} of {len(lines)} bytes written")
         except OSError:
+            # Closing cuts off the bytes behind the last whole line.
             self.close()
             raise
         self.size += len(lines)
@@ -265,7 +272,7 @@ class ReservedFile:
         self.open()
 
     def close(self) -> None:
-        """Let the file go, without its reserve; the next line opens it again."""
+        """Close the file without its reserve; the next line opens it again."""
         if self._descriptor is not None:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._descriptor, self.size)
@@ -276,9 +283,9 @@ class ReservedFile:
         self._room = max(self._room, self.size)
         if self._room - self.size < RESERVE_BYTES:
             # Zeros are written out: a hole in a sparse file reserves nothing.
-            wanted = bytes(self.size + 2 * RESERVE_BYTES - self._room)
+            zeros = bytes(self.size + 2 * RESERVE_BYTES - self._room)
             with contextlib.suppress(OSError):
-                self._room += os.pwrite(descriptor, wanted, self._room)
+                self._room += os.pwrite(descriptor, zeros, self._room)
 
 
 @contextmanager
@@ -286,11 +293,11 @@ def lease(file: Path, what: str) -> Iterator[None]:
     """Hold a lock within ``with``; the kernel frees the lock of a killed process.
 
     Args:
-        file: Where; its folder is made.
-        what: Who is leased, for the refusal.
+        file: Lock file; its folder is made.
+        what: Thing that is leased, for the refusal.
 
     Raises:
-        HopError: somebody holds it.
+        HopError: another process holds it.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
     handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
@@ -317,23 +324,21 @@ class FileByRobot(Generic[_T]):
 
     Args:
         path: The file.
-        name: What it holds; stands in its first line.
+        name: Name of its content, in its first line.
         reader: Reads a robot's id and value.
     """
 
     def __init__(
         self, path: Path, name: str, reader: TypeAdapter[tuple[str, _T]]
     ) -> None:
-        self._path = path
-        self._form = Form(name)
-        self._reader = reader
+        self._path, self._form, self._reader = path, Form(name), reader
 
     def load(self) -> Mapping[str, _T]:
-        """The stored ones, by robot."""
+        """Stored values, by robot."""
         return dict(load_lines(self._path, self._form, self._reader.validate_json))
 
     async def save(self, known: Mapping[str, _T]) -> None:
-        """Replace the stored ones; returns when they are on disk.
+        """Replace the stored values; returns when they are on disk.
 
         Raises:
             HopError: the disk did not take them.

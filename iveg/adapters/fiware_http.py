@@ -1,14 +1,13 @@
 """HTTP to Orion and the IoT Agent: their headers, pages, failures, and their bearer.
 
-A PEP proxy before them may ask for a token.  One for both is got at a token endpoint
-(OAuth 2.0; FIWARE Keyrock's ``/oauth2/token``) before the first request::
+A PEP proxy before them may require a token.  Both share a token of one endpoint (OAuth
+2.0; FIWARE Keyrock's ``/oauth2/token``), which is fetched before the first request::
 
-    none ──ask──> held ──at 80 % of its life: asked for beside──> held anew
-      ^             └──refused (401), or over──> asked for, and waited for
+    none ──fetch──> held ──at 80 % of its life: fetched beside requests──> held anew
+      ^               └──refused (401), or expired──> fetched while requests wait
       └── not given: requests fail with that cause, and never leave without a bearer
 
-It is asked for once, however many requests wait, and after a failure not before a
-pause.
+One fetch serves all requests that wait; after a failure the next comes after a pause.
 """
 
 import asyncio
@@ -16,6 +15,7 @@ import logging
 import socket
 import ssl
 from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from http import HTTPStatus
@@ -32,10 +32,11 @@ from iveg.domain.wire import OR_NONE
 HOP: Final = "token"
 _PART_OF_LIFE: Final = 0.8
 _PAUSE_S: Final = 2.0
-"""Between a failure and the next question for a token."""
+"""Time between a failure and the next request for a token (s)."""
 _REFUSED_S: Final = 5.0
-_UNTOLD_S: Final = 300.0
-"""Life of a token that does not say how long it lasts."""
+"""Time after a refused token in which a refusal fetches no other (s)."""
+_DEFAULT_LIFE_S: Final = 300.0
+"""Life of a token whose endpoint gives no ``expires_in`` (s)."""
 _log = logging.getLogger(__name__)
 
 TokenHeader = Literal["Authorization", "X-Auth-Token"]
@@ -46,12 +47,12 @@ class TokenGrant:
     """Request for a token.
 
     Attributes:
-        url: Of the token endpoint.
+        url: Address of the token endpoint.
         client_id: Name of iVeg there, with its ``secret``.
         user: With ``password``: iVeg acts as this user (password grant); empty: as
-            itself (client credentials).  A token of Keyrock's by client credentials has
-            no roles, so a PEP proxy that looks at them wants a user.
-        header: Which the proxy reads.
+            itself (client credentials).  Keyrock's token by client credentials has no
+            roles, so a PEP proxy that checks roles needs a user.
+        header: Header that the proxy reads.
     """
 
     url: str
@@ -65,18 +66,18 @@ class TokenGrant:
     @property
     def form(self) -> dict[str, str]:
         """Form to post (RFC 6749, 4.3.2 and 4.4.2)."""
-        asked = {"grant_type": "client_credentials"}
+        form = {"grant_type": "client_credentials"}
         if self.user:
-            asked = {
+            form = {
                 "grant_type": "password",
                 "username": self.user,
                 "password": self.password,
             }
-        return asked | ({"scope": self.scope} if self.scope else {})
+        return form | ({"scope": self.scope} if self.scope else {})
 
 
 class _Answer(BaseModel):
-    """A token as an endpoint gives it; what cannot stand in a header is none."""
+    """Answer of a token endpoint; the token must fit into a header."""
 
     access_token: Annotated[str, Field(pattern=r"^[\x21-\x7e]{1,16384}$")]
     expires_in: Annotated[Annotated[float, Field(gt=0, le=86400)] | None, OR_NONE] = (
@@ -85,12 +86,12 @@ class _Answer(BaseModel):
 
 
 class FiwareToken(httpx.Auth):
-    """Gets the token, keeps it new, and sends requests with it.
+    """Fetches the token, renews it, and sends requests with it.
 
     Args:
         grant: The request for it.
         mono: The monotonic clock (s).
-        http: Asks the endpoint.
+        http: HTTP to the endpoint.
     """
 
     def __init__(
@@ -109,11 +110,11 @@ class FiwareToken(httpx.Auth):
     async def async_auth_flow(
         self, request: httpx.Request
     ) -> AsyncGenerator[httpx.Request, httpx.Response]:
-        """Send a request with a token; once more after a 401. Raises HopError.
+        """Send a request with a token; once more after a 401.  Raises HopError.
 
-        What a proxy refused has not reached the neighbour: sent again, it comes once.
+        A refused request has not reached the neighbour, so a repetition arrives once.
         """
-        # A little less than the whole, so that it is known what was waited for.
+        # Less than the request's own time, so that the error names the token endpoint.
         patience_s = _TOKEN_PART * request.extensions["timeout"]["read"]
         token = await self._in_time(patience_s)
         response = yield self._carrying(request, token)
@@ -135,23 +136,23 @@ class FiwareToken(httpx.Auth):
         return request
 
     async def _current(self) -> str:
-        """A token that is not over. Raises HopError: there is none."""
+        """A token that has not expired.  Raises HopError: there is none."""
         now = self._mono()
         is_asking = self._asking is not None and not self._asking.done()
         if now >= max(self._renew_at, self._again_at) and not is_asking:
-            # Beside: while the old one lasts, nobody waits for the new one.
+            # A task: while the old token lasts, no request waits for the new one.
             self._asking = asyncio.create_task(self._renew(), name="fiware-token")
         if now >= self._ends_at and self._asking is not None:
-            # Who gives up takes the answer from nobody else.
+            # Shielded: a request that gives up must not cancel the others' fetch.
             await asyncio.shield(self._asking)
             if self._error:
                 raise HopError(HOP, self._error)
         return self._text
 
     def _may_be_replaced(self, refused: str) -> bool:
-        """Whether another token may do better than a refused one.
+        """Whether another token may succeed after this one was refused.
 
-        Wilma says 401 also to whom it knows and gives no role: then none does.
+        Wilma also answers 401 to a known user without a role: no token helps there.
         """
         if self._text == refused:
             now = self._mono()
@@ -177,7 +178,7 @@ class FiwareToken(httpx.Auth):
                 _log.warning("no bearer for Orion and the agent: %s", error)
             self._error, self._again_at = error.detail, self._mono() + _PAUSE_S
             return
-        life_s = answer.expires_in or _UNTOLD_S
+        life_s = answer.expires_in or _DEFAULT_LIFE_S
         self._text, self._error = answer.access_token, ""
         self._renew_at, self._ends_at = began + _PART_OF_LIFE * life_s, began + life_s
 
@@ -190,23 +191,23 @@ class FiwareToken(httpx.Auth):
         try:
             return _Answer.model_validate(answer.body)
         except ValidationError:
-            # Of the error nothing: it shows what was given.
+            # Without the cause, which would show the answer, maybe with a token.
             raise HopError(HOP, "answered no token") from None
 
 
 _NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
 _KEPT_S = 2.0
-"""A connection unused for longer is not used again: Node.js, and so the IoT Agent,
-closes it after 5 s, and a request that crosses the closing on its way has no answer."""
+"""Longest idle time of a connection that is kept (s).  Node.js, and so the IoT
+Agent, closes it after 5 s; a request that crosses the closing gets no answer."""
 _MOST_CONNECTIONS = 100
 PAGE_SIZE = 100
 TIMEOUT_S = 6.0
-"""A little more than the five seconds that Orion waits for a hung agent."""
+"""Time limit of a request (s): more than the 5 s that Orion waits for a hung agent."""
 PROBE_TIMEOUT_S = 3.0
-"""For a question that a healthy neighbour answers in milliseconds."""
+"""Time limit of a question that a healthy neighbour answers in milliseconds (s)."""
 _MOST_PAGES = 100
 NO_TOKEN = "token endpoint down"  # noqa: S105 - a cause
-"""Begins the cause where a request did not leave, as no token could be had."""
+"""Beginning of the cause where a request did not leave for want of a token."""
 _TOKEN_PART = 0.9
 
 Document = dict[str, Any]
@@ -217,12 +218,12 @@ MEANINGLESS = "answered something that means nothing here"
 
 @cache
 def _trusted() -> ssl.SSLContext:
-    """Certificates, read once for all neighbours: 25 ms of a processor each time."""
+    """Trusted certificates, read once for all neighbours: a read takes 25 ms of CPU."""
     return httpx.create_ssl_context()
 
 
 class FiwareHttp:
-    """HTTP to one neighbour, as FIWARE speaks it; ``async with`` closes it.
+    """HTTP to one neighbour with FIWARE's headers; ``async with`` closes it.
 
     Failures are ``HopError``.
 
@@ -230,10 +231,10 @@ class FiwareHttp:
         url: Address without a path.
         service: ``Fiware-Service``.
         path: ``Fiware-ServicePath``.
-        access: Where a proxy before it asks for a token; None: none does.
+        access: Token for a proxy before the neighbour; None: without.
 
     Attributes:
-        HOP: Names the neighbour in errors.
+        HOP: Name of the neighbour in errors.
     """
 
     HOP: ClassVar[str]
@@ -286,14 +287,14 @@ class FiwareHttp:
         timeout_s: float = TIMEOUT_S,
         also: Sequence[int] = (),
     ) -> httpx.Response:
-        """One request.
+        """Send one request; returns the response.
 
         Args:
             method: HTTP method.
-            path: With a leading slash.
+            path: Path with a leading slash.
             query: Parameters.
             body: Sent as JSON unless None.
-            timeout_s: For the whole exchange (s), however slowly it trickles.
+            timeout_s: Time limit of the whole exchange (s).
             also: Statuses beside 2xx that the caller understands.
 
         Raises:
@@ -301,6 +302,7 @@ class FiwareHttp:
             HopError: no connection, no token for a proxy, or another status.
         """
         try:
+            # httpx's own limit counts anew with each byte that trickles in.
             async with asyncio.timeout(timeout_s):
                 response = await self._client.request(
                     method,
@@ -323,8 +325,17 @@ class FiwareHttp:
             return response
         raise HopError(self.HOP, _complaint(method, path, response))
 
+    async def create(self, path: str, body: Document) -> bool:
+        """Create something; False where it already exists.  Raises HopError."""
+        response = await self.ask("POST", path, body=body, also=(HTTPStatus.CONFLICT,))
+        return response.is_success
+
+    async def delete(self, path: str, query: Mapping[str, str] | None = None) -> None:
+        """Delete something; its absence is no error.  Raises HopError."""
+        await self.ask("DELETE", path, query=query, also=(HTTPStatus.NOT_FOUND,))
+
     def read_object(self, response: httpx.Response) -> Document:
-        """The object that is an answer. Raises HopError: it is anything else."""
+        """Read an answer that is an object.  Raises HopError: it is not."""
         try:
             return _OBJECT.validate_json(response.content)
         except ValidationError as error:
@@ -333,41 +344,38 @@ class FiwareHttp:
     async def read_all(
         self, path: str, query: Mapping[str, str] | None = None, part: str = ""
     ) -> list[Document]:
-        """Every object of a list, page by page; one without an end is left.
+        """Every object of a list, page by page, up to 100 pages.
 
         Args:
-            path: Where the list is.
+            path: Path of the list.
             query: Parameters of each page.
             part: Member of the agent's answer that holds the list.
 
         Raises:
-            HopError: no answer, or none that means anything.
+            HopError: no answer, or an unreadable answer.
         """
-        found: list[Document] = []
+        objects: list[Document] = []
         for _ in range(_MOST_PAGES):
-            page = {"limit": str(PAGE_SIZE), "offset": str(len(found))}
+            page = {"limit": str(PAGE_SIZE), "offset": str(len(objects))}
             response = await self.ask("GET", path, query={**(query or {}), **page})
             try:
                 answer = orjson.loads(response.content)
                 rows = _OBJECTS.validate_python(answer[part] if part else answer)
             except (ValueError, LookupError, TypeError) as error:
                 raise HopError(self.HOP, MEANINGLESS) from error
-            found += rows
+            objects += rows
             if len(rows) < PAGE_SIZE:
                 break
-        return found
+        return objects
 
 
 def _complaint(method: str, path: str, response: httpx.Response) -> str:
-    """The reason of a refusal, short; each neighbour uses another word."""
-    try:
+    """Short reason of a refusal; each neighbour has another name for it."""
+    body: Document = {}
+    with suppress(ValidationError):
         body = _OBJECT.validate_json(response.content)
-    except ValidationError:
-        body = {}
     # ``detail`` is a PEP proxy's.
-    words = [
-        str(body[w])[:160] for w in ("description", "message", "detail") if body.get(w)
-    ]
-    said = words[0] if words else ""
-    refused = f"{response.status_code} to {method} {path}"
-    return f"{refused}: {said}" if said else refused
+    words = (str(body.get(w) or "") for w in ("description", "message", "detail"))
+    reason = next(filter(None, words), "")[:160]
+    refusal = f"{response.status_code} to {method} {path}"
+    return f"{refusal}: {reason}" if reason else refusal

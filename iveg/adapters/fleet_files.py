@@ -1,8 +1,8 @@
 """Fleet files: TOML and short words in, a checked fleet out.
 
-Members of the fleet are the words of ``IVEG_ROBOTS``, or else every robot of the file
-of ``IVEG_FLEET``, or else every robot that iVeg itself describes.  The description of
-each comes from the file, or else from iVeg's own fleet; a robot may have none.
+Members of the fleet are the words of ``IVEG_ROBOTS``, or else all robots of the file
+of ``IVEG_FLEET``, or else the built-in robots.  A robot's description comes from the
+file, or else from the built-in fleet; a robot may have none.
 """
 
 import math
@@ -11,14 +11,10 @@ from dataclasses import replace
 from functools import cache
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Field,
-    model_validator,
-)
+from pydantic import BeforeValidator, Field, model_validator
 
-from iveg.adapters.toml_files import Table, complaint, read_table, read_text
+from iveg.adapters.toml_files import Table, complaint, must, read_table, read_text
+from iveg.domain.detector import read_classes
 from iveg.domain.errors import UnreadableError
 from iveg.domain.fleet import (
     CAUTIOUS,
@@ -30,19 +26,18 @@ from iveg.domain.fleet import (
     split_word,
 )
 from iveg.domain.geometry import Pose2D
-from iveg.domain.words import read_classes
 
 
 def load_fleet(file: str = "", words: Sequence[str] = ()) -> FleetDescription:
-    """The fleet of a file and of short words; both may be missing.
+    """Fleet of a file and of short words; both may be missing.
 
     Args:
-        file: Path of a fleet file; empty: iVeg's own describes AGI and AGII.
-        words: Who is in the fleet, such as ``AGI`` or ``D1:recording``; a kind that is
-            said here counts before that of the file.
+        file: Path of a fleet file; empty: the built-in one describes AGI and AGII.
+        words: Members, such as ``AGI`` or ``D1:recording``; a kind given here counts
+            before the file's.
 
     Raises:
-        DataFileError: the file cannot be used; it says file and key.
+        DataFileError: the file cannot be used; it names file and key.
     """
     known = built_in() if not file else read_fleet(read_text(file), file)
     if not words:
@@ -52,7 +47,7 @@ def load_fleet(file: str = "", words: Sequence[str] = ()) -> FleetDescription:
         name, kind = split_word(word) or (word, None)
         robot = known.members.get(name) or built_in().of_robot(name)
         robots.append(robot if kind is None else replace(robot, kind=kind))
-    return FleetDescription.of(robots)
+    return FleetDescription.from_robots(robots)
 
 
 @cache
@@ -67,23 +62,16 @@ def read_fleet(text: str, file: str) -> FleetDescription:
     Raises:
         DataFileError: naming file, key and reason.
     """
-    page = read_table(text, file, _FileTable)
-    robots = [row.value() for row in page.robots]
+    robots = [row.value() for row in read_table(text, file, _FileTable).robots]
     names = [robot.robot_id for robot in robots]
     for index, name in enumerate(names):
         if name in names[:index]:
             reason = f"{name} is in the list twice"
             raise complaint(file, ("robots", index, "id"), reason)
-    return FleetDescription.of(robots)
+    return FleetDescription.from_robots(robots)
 
 
 # --- the shape of the file --------------------------------------------------------
-
-
-def _checked_id(text: str) -> str:
-    if not is_robot_id(text):
-        raise ValueError("must be 1 to 64 letters, digits and hyphens")
-    return text
 
 
 def _classes(text: object) -> object:
@@ -117,16 +105,23 @@ class _Drive(Table):
     assumed_braking_m_s2: _Acceleration | None = None
 
     @model_validator(mode="after")
-    def _not_more_than_it_does(self) -> Self:
+    def _assumes_no_stronger_brakes(self) -> Self:
+        # The rule counts on the assumed braking: a high value makes too short a way.
         if (self.assumed_braking_m_s2 or 0.0) > self.braking_m_s2:
             raise ValueError("assumed_braking_m_s2 must not be above braking_m_s2")
         return self
 
 
-class _Camera(Table):
+class _Mount(Table):
     x_m: _Place = 0.0
     y_m: _Place = 0.0
     yaw_rad: _Angle = 0.0
+
+    def pose(self) -> Pose2D:
+        return Pose2D(self.x_m, self.y_m, self.yaw_rad)
+
+
+class _Camera(_Mount):
     height_m: Annotated[float, Field(gt=0, le=10)] = CAUTIOUS.camera_height
     fov_deg: Annotated[float, Field(gt=0, le=360)]
     range_m: Annotated[float, Field(gt=0, le=100)]
@@ -134,14 +129,8 @@ class _Camera(Table):
     frame: _FrameName | None = None
 
 
-class _Laser(Table):
-    x_m: _Place = 0.0
-    y_m: _Place = 0.0
-    yaw_rad: _Angle = 0.0
-
-
 class _Robot(Table):
-    id: Annotated[str, AfterValidator(_checked_id)]
+    id: Annotated[str, must(is_robot_id, "must be 1 to 64 letters, digits and hyphens")]
     kind: Kind = "live"
     detector: bool = True
     pose_frame: _FrameName = "map"
@@ -149,15 +138,14 @@ class _Robot(Table):
     body: _Body | None = None
     drive: _Drive | None = None
     camera: _Camera | None = None
-    laser: _Laser = _Laser()
+    laser: _Mount = _Mount()
 
     def value(self) -> RobotDescription:
-        body, drive, camera, laser = self.body, self.drive, self.camera, self.laser
-        known: dict[str, Any] = {"laser": Pose2D(laser.x_m, laser.y_m, laser.yaw_rad)}
+        body, drive, camera = self.body, self.drive, self.camera
+        known: dict[str, Any] = {"laser": self.laser.pose()}
         if body is not None:
             known |= {"length": body.length_m, "width": body.width_m}
         if drive is not None:
-            least = min(CAUTIOUS.assumed_braking, drive.braking_m_s2)
             known |= {
                 "drive": drive.type,
                 "max_speed": drive.max_speed_m_s,
@@ -165,11 +153,13 @@ class _Robot(Table):
                 "turning_radius": drive.turning_radius_m,
                 "acceleration": drive.acceleration_m_s2,
                 "braking": drive.braking_m_s2,
-                "assumed_braking": drive.assumed_braking_m_s2 or least,
+                # Without a value brakes count as no better than the cautious.
+                "assumed_braking": drive.assumed_braking_m_s2
+                or min(CAUTIOUS.assumed_braking, drive.braking_m_s2),
             }
         if camera is not None:
             known |= {
-                "camera": Pose2D(camera.x_m, camera.y_m, camera.yaw_rad),
+                "camera": camera.pose(),
                 "camera_height": camera.height_m,
                 "camera_fov": math.radians(camera.fov_deg),
                 "camera_range": camera.range_m,

@@ -1,7 +1,7 @@
 """Greenhouse files: TOML in, a checked ``Greenhouse`` out.
 
 An unusable file is refused with key and reason, so that a grower who measured a
-greenhouse can mend the file without reading this code.
+greenhouse can correct the file without reading this code.
 """
 
 from collections.abc import Sequence
@@ -27,10 +27,10 @@ def load_greenhouse(name_or_file: str) -> Greenhouse:
     """Load one of ``BUILT_IN`` by name, or a file by its path.
 
     Raises:
-        DataFileError: no such greenhouse, or one that cannot be used.
+        DataFileError: no such greenhouse, or an unusable file.
     """
-    own = {name: f"greenhouses/{name}.toml" for name in BUILT_IN}
-    return read_greenhouse(read_text(name_or_file, own), name_or_file)
+    built_in = {name: f"greenhouses/{name}.toml" for name in BUILT_IN}
+    return read_greenhouse(read_text(name_or_file, built_in), name_or_file)
 
 
 def read_greenhouse(text: str, file: str) -> Greenhouse:
@@ -44,7 +44,7 @@ def read_greenhouse(text: str, file: str) -> Greenhouse:
     for name in ("lanes", "rows", "posts", "obstacles", "starts"):
         items: Sequence[_Area | _Point] = getattr(page, name)
         for index, item in enumerate(items):
-            # A typing slip seldom stays within the outer wall.
+            # Most typing errors lie outside the outer wall.
             if not all(bounds.contains(x, y) for x, y in item.corners()):
                 raise complaint(file, (name, index), "lies outside bounds")
     return Greenhouse(

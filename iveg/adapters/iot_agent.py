@@ -1,10 +1,11 @@
-"""The IoT Agent's north port: its groups and devices."""
+"""Requests to the IoT Agent's north port: groups and devices."""
 
 from collections.abc import Sequence
 
 from iveg.adapters.fiware_http import PROBE_TIMEOUT_S, Document, FiwareHttp
 from iveg.ngsi import names
 
+GROUPS, DEVICES = "/iot/services", "/iot/devices"
 RESOURCE = "/iot/json"
 _COMMANDS = [{"name": name, "type": "command"} for name in names.COMMANDS]
 
@@ -23,56 +24,9 @@ class IotAgentClient(FiwareHttp):
         response = await self.ask("GET", "/iot/about", timeout_s=PROBE_TIMEOUT_S)
         return str(self.read_object(response).get("version", "unknown"))
 
-    async def create_group(self, group: Document) -> bool:
-        """Make a group; False where there is one with this key already.
-
-        Raises:
-            HopError: the agent does not take it.
-        """
-        body = {"services": [group]}
-        response = await self.ask("POST", "/iot/services", body=body, also=(409,))
-        return response.status_code != 409
-
-    async def change_group(self, apikey: str, changes: Document) -> None:
-        """Change a group.
-
-        Raises:
-            HopError: the agent does not take it.
-        """
-        query = {"resource": RESOURCE, "apikey": apikey}
-        await self.ask("PUT", "/iot/services", query=query, body=changes)
-
-    async def read_devices(self) -> list[Document]:
-        """The devices of our tenant.
-
-        Raises:
-            HopError: the agent does not answer.
-        """
-        return await self.read_all("/iot/devices", part="devices")
-
-    async def create_device(self, device: Document) -> bool:
-        """Make a device; False where there is one with this id already.
-
-        Raises:
-            HopError: the agent does not take it.
-        """
-        body = {"devices": [device]}
-        response = await self.ask("POST", "/iot/devices", body=body, also=(409,))
-        return response.status_code != 409
-
-    async def delete_device(self, device_id: str) -> bool:
-        """Delete a device; whether there was one.
-
-        Raises:
-            HopError: the agent does not answer.
-        """
-        path = f"/iot/devices/{device_id}"
-        response = await self.ask("DELETE", path, also=(404,))
-        return response.status_code != 404
-
 
 def write_group(apikey: str, cbroker_url: str) -> Document:
-    """The group of an API key as the agent is told."""
+    """The group of an API key as it is sent to the agent."""
     return {
         "apikey": apikey,
         "resource": RESOURCE,
@@ -82,7 +36,7 @@ def write_group(apikey: str, cbroker_url: str) -> Document:
         "lazy": [],
         "commands": [],
         "static_attributes": [],
-        # A measure of a device that is not there makes nothing.
+        # A measure of an unknown device must not create an entity.
         "autoprovision": False,
     }
 
@@ -107,5 +61,6 @@ def write_device(
         "attributes": [
             {"object_id": name, "name": name, "type": kind} for name, kind in attributes
         ],
+        # On one device alone: of several the agent would choose one for a command.
         "commands": _COMMANDS if has_command else [],
     }

@@ -1,8 +1,8 @@
 """The journal of orders: the desired state of each robot, and each step of an order.
 
 A file of JSON lines that are on disk before an order is accepted; it outlives a crash
-of iVeg, a lost database and a full disk.  A line of a robot's desired state that says
-nothing new is not written.  The history copies the rows of orders by their revision;
+of iVeg, a lost database and a full disk.  A repeated desired state is not
+written.  The history copies the rows of orders by their revision;
 once it holds them, the file is compacted to the lines that still count.
 """
 
@@ -28,22 +28,24 @@ from iveg.vital.record import Waiting
 _log = logging.getLogger(__name__)
 
 FORM = Form("stop-journal")
+# Names of the classes stand in the file: a renamed one would be skipped as unreadable.
 _KINDS = {kind.__name__: kind for kind in RECORD_TYPES}
+# As many as a robot remembers to have released (`RELEASED_KEPT` in `robot/holds.py`).
 _NAMED_KEPT = 64
-"""As many as a robot remembers to have released."""
 _LEAST_COMPACTED = 2**18
-"""Bytes: a smaller file is left as it is while iVeg runs."""
+"""Smallest file that is compacted while iVeg runs (bytes)."""
 _MOST_WAITING = 10_000
-"""Lines that a disk has refused are written again later: the newest of them."""
+"""Lines that wait for another attempt after the disk refused them; the newest stay."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Wish:
-    """One line of a robot's desired state.
+class _DesiredLine:
+    """One line of a robot's desired state; its fields are the keys of the file.
 
     Attributes:
+        at: Time of the order (Unix s).
         named: Holds that a release is about to name; None in a line of the earlier
-            version, which does not say what a release has named.
+            version, where they are unknown.
         ch: The challenge of that release.
     """
 
@@ -56,8 +58,8 @@ class _Wish:
     ch: str | None = None
 
 
-_WISH: Final = TypeAdapter(_Wish)
-_Line = _Wish | Waiting
+_DESIRED_LINE: Final = TypeAdapter(_DesiredLine)
+_Line = _DesiredLine | Waiting
 
 
 class FileJournal:
@@ -76,10 +78,10 @@ class FileJournal:
         self._is_newer = False
         # Of its own: the default threads may all be busy with files of comfort.
         self._thread = ThreadPoolExecutor(1, "stop-journal")
-        self._memory: dict[str, _Memory] = defaultdict(_Memory)
+        self._robots: dict[str, _RobotLines] = defaultdict(_RobotLines)
         self._rows: dict[int, Waiting] = {}
         """Rows on disk that the history may not hold, by revision."""
-        self._newest: dict[str, _Wish] = {}
+        self._newest: dict[str, _DesiredLine] = {}
         """Each robot's newest line of this run, without its author and time."""
         self._waiting: list[_Line] = []
         """Lines that are not on disk yet, oldest first."""
@@ -93,18 +95,18 @@ class FileJournal:
         A line that a crash cut short is skipped.  The file is compacted unless a newer
         iVeg wrote it.
         """
-        self._memory, self._rows = defaultdict(_Memory), {}
+        self._robots, self._rows = defaultdict(_RobotLines), {}
         lines = 0
         for number, line in self._lines():
             lines += 1
             try:
-                self._take(_read(line))
+                self._add(_read(line))
             except (KeyError, TypeError, ValueError):
                 _log.warning("%s, line %d: not readable, skipped", self._path, number)
         if not self._is_newer:
-            self._tidy(lines)
-        found = {name: memory.wanted() for name, memory in self._memory.items()}
-        return {name: wanted for name, wanted in found.items() if wanted is not None}
+            self._compact(lines)
+        records = {name: robot.desired() for name, robot in self._robots.items()}
+        return {name: record for name, record in records.items() if record is not None}
 
     def left(self) -> Sequence[Waiting]:
         """Rows of orders that the history may not hold."""
@@ -116,38 +118,40 @@ class FileJournal:
         try:
             yield from read_lines(self._path, FORM)
         except DataFileError as error:
-            # Its lines are still the best that is known of what is to stand.
-            _log.error("%s  It is read all the same and left as it is.", error)
+            # Its lines are the best knowledge of which robots are to stand.
+            _log.error("%s  The file is read all the same and left as it is.", error)
             self._is_newer = True
             yield from enumerate(
                 self._path.read_bytes().rstrip(b"\0").splitlines()[1:], 2
             )
 
-    def _take(self, line: _Line) -> None:
+    def _add(self, line: _Line) -> None:
         if isinstance(line, Waiting):
             self._rows[line.revision] = line
         else:
-            self._memory[line.robot_id].take(line)
+            self._robots[line.robot_id].add(line)
 
-    def _tidy(self, lines: int) -> None:
-        fewest, spilled = self._fewest(), self._spilled
+    def _compact(self, lines: int) -> None:
+        """Rewrite the file where fewer than its ``lines`` still count, and open it."""
+        kept, spilled = self._kept_lines(), self._spilled
         has_spilled = spilled is not None and spilled.exists()
         try:
-            if has_spilled or len(fewest) < lines:
-                self._file.rewrite(b"".join(fewest))
+            if has_spilled or len(kept) < lines:
+                self._file.rewrite(b"".join(kept))
             self._file.open()
             if has_spilled and spilled is not None:
+                # Last: until the rewrite is on disk only this file has its rows.
                 spilled.unlink()
                 spilled.with_name(f"{spilled.name}-reserve").unlink(missing_ok=True)
         except OSError as error:
             _log.warning("the command journal could not be compacted: %s", error)
 
-    def _fewest(self) -> list[bytes]:
-        """The lines that still count."""
+    def _kept_lines(self) -> list[bytes]:
+        """Lines that still count."""
         lines: list[_Line] = []
-        for memory in self._memory.values():
-            lines += memory.lines()
-        return [_line_of(line) for line in (*lines, *self._rows.values())]
+        for robot in self._robots.values():
+            lines += robot.lines()
+        return [_write(line) for line in (*lines, *self._rows.values())]
 
     # --- while iVeg runs ----------------------------------------------------------
 
@@ -164,88 +168,93 @@ class FileJournal:
     ) -> None:
         """Append one line; returns when it is on disk.
 
-        ``named``: STOPs that a release is about to name.  A disk that fails is logged
+        ``named``: holds that a release is about to name.  A disk that fails is logged
         and does not hold up the STOP.
         """
-        wish = _Wish(robot_id, desired, by, at.wall, hold_id, tuple(named), challenge)
-        self._waiting.append(wish)
+        self._waiting.append(
+            _DesiredLine(
+                robot_id, desired, by, at.wall, hold_id, tuple(named), challenge
+            )
+        )
         await self.flushed()
 
     def note(self, row: Waiting) -> None:
-        """Have a row of an order written with what is flushed next."""
+        """Have a row of an order written with the next flush."""
         self._waiting.append(row)
 
     async def flushed(self) -> None:
-        """Return when all that waits is on disk; who asks at once shares one write."""
+        """Return when all waiting lines are on disk; callers at once share a write."""
         async with self._lock:
             # One turn, so that a press and its steps go to the disk together.
             await asyncio.sleep(0)
             batch, self._waiting = self._waiting, []
-            fresh = [one for one in batch if self._is_news(one)]
+            fresh = [line for line in batch if self._is_new(line)]
             is_written = not fresh
             try:
                 if fresh:
-                    lines = b"".join(_line_of(one) for one in fresh)
+                    lines = b"".join(map(_write, fresh))
                     await self._in_thread(self._file.append, lines)
                 is_written = True
             except OSError:
                 _log.exception("the command journal could not be written")
             finally:
-                # Cancelled half-way counts as not written: twice is harmless.
+                # A cancelled write counts as failed: a line written twice is harmless.
                 if not is_written:
+                    # Else these lines would not be new at the next attempt.
                     self._newest.clear()
                     self._waiting = [*batch, *self._waiting][-_MOST_WAITING:]
             if is_written:
                 for line in fresh:
-                    self._take(line)
+                    self._add(line)
 
     async def committed(self, revisions: Collection[int]) -> None:
-        """Let go of rows that the history holds, and compact the file where it grew."""
+        """Drop rows that the history holds, and compact the file where it grew."""
         async with self._lock:
-            for one in revisions:
-                self._rows.pop(one, None)
+            for revision in revisions:
+                self._rows.pop(revision, None)
             self._waiting = [
-                one
-                for one in self._waiting
-                if not isinstance(one, Waiting) or one.revision not in revisions
+                line
+                for line in self._waiting
+                if not isinstance(line, Waiting) or line.revision not in revisions
             ]
             if self._file.size < self._compacts_at or self._is_newer:
                 return
             try:
-                fewest = b"".join(self._fewest())
-                await self._in_thread(self._file.rewrite, fewest)
+                await self._in_thread(self._file.rewrite, b"".join(self._kept_lines()))
             except OSError as error:
                 _log.warning("the command journal could not be compacted: %s", error)
+            # Twice, so that rewriting stays rare however many lines still count.
             self._compacts_at = max(_LEAST_COMPACTED, 2 * self._file.size)
 
     def close(self) -> None:
-        """Let thread and file go."""
+        """End the thread and close the file."""
         self._thread.shutdown()
         self._file.close()
 
     async def _in_thread(self, work: Callable[[bytes], None], lines: bytes) -> None:
-        await asyncio.get_running_loop().run_in_executor(self._thread, work, lines)
+        await asyncio.wrap_future(self._thread.submit(work, lines))
 
-    def _is_news(self, line: _Line) -> bool:
-        """Whether a line says anything new; each row of an order does.
+    def _is_new(self, line: _Line) -> bool:
+        """Whether a line changes the desired state; each row of an order counts as new.
 
-        The audit has who said it again, and when.
+        The audit has author and time of a repetition.
         """
         if isinstance(line, Waiting):
             return True
         facts = replace(line, by="", at=0.0)
-        is_news = self._newest.get(line.robot_id) != facts
+        is_new = self._newest.get(line.robot_id) != facts
         self._newest[line.robot_id] = facts
-        return is_news
+        return is_new
 
 
-def _line_of(line: _Line) -> bytes:
-    if isinstance(line, _Wish):
+def _write(line: _Line) -> bytes:
+    if isinstance(line, _DesiredLine):
         return orjson.dumps(line) + b"\n"
     head = {"kind": type(line.record).__name__, "revision": line.revision}
     try:
         return orjson.dumps(head | {"record": asdict(line.record)}) + b"\n"
     except orjson.JSONEncodeError as error:
+        # Left out: raised, it would keep the other lines of its batch off the disk.
         _log.error("the command journal cannot hold a %s: %s", head["kind"], error)
         return b""
 
@@ -253,57 +262,59 @@ def _line_of(line: _Line) -> bytes:
 def _read(line: bytes) -> _Line:
     entry: Json = orjson.loads(line)
     if "kind" not in entry:
-        return _WISH.validate_python(entry)
+        return _DESIRED_LINE.validate_python(entry)
     kind, members = _KINDS[entry["kind"]], entry["record"]
-    known = {one.name: members[one.name] for one in fields(kind) if one.name in members}
+    # A record of another version may have fewer or more members.
+    known = {key.name: members[key.name] for key in fields(kind) if key.name in members}
     return Waiting(kind(**known), int(entry["revision"]), 0.0)
 
 
-class _Memory:
-    """The content of one robot's lines so far."""
+class _RobotLines:
+    """Content of one robot's lines so far."""
 
     def __init__(self) -> None:
-        self._newest: _Wish | None = None
+        self._newest: _DesiredLine | None = None
         self._named: tuple[str, ...] = ()
-        self._release: _Wish | None = None
+        """Holds that a release has named, newest last."""
+        self._release: _DesiredLine | None = None
         """The newest release, if nothing has confirmed it."""
 
-    def take(self, wish: _Wish) -> None:
-        """Read one line more."""
-        if wish.named is None:
-            # A release may have named its hold.
-            wish = replace(wish, hold_id=None)
-        self._newest, named = wish, wish.named or ()
+    def add(self, line: _DesiredLine) -> None:
+        """Take one more line into account."""
+        if line.named is None:
+            # A release may have named its hold, so that iVeg stops under a new id.
+            line = replace(line, hold_id=None)
+        self._newest, named = line, line.named or ()
         if named:
-            self._release = wish
-            fresh = tuple(one for one in self._named if one not in named)
-            self._named = (*fresh, *named)[-_NAMED_KEPT:]
-        if wish.desired == "run":
+            self._release = line
+            older = tuple(hold_id for hold_id in self._named if hold_id not in named)
+            self._named = (*older, *named)[-_NAMED_KEPT:]
+        if line.desired == "run":
             self._release = None
 
-    def wanted(self) -> DesiredRecord | None:
-        """The desire that the robot stands; None where it may drive."""
+    def desired(self) -> DesiredRecord | None:
+        """Desired state of a robot that is to stand; None where it may drive."""
         newest, release = self._newest, self._release
         if newest is None or newest.desired == "run":
             return None
         challenge = None if release is None else release.ch
         return DesiredRecord(
-            newest.by, newest.hold_id, self._named, self._asked(), challenge
+            newest.by, newest.hold_id, self._named, self._unconfirmed(), challenge
         )
 
-    def lines(self) -> Iterator[_Wish]:
+    def lines(self) -> Iterator[_DesiredLine]:
         """The fewest lines with the same content."""
         if self._newest is None:
             return
-        last = replace(self._newest, named=(), ch=None)
-        older = tuple(one for one in self._named if one not in self._asked())
+        last, named = replace(self._newest, named=(), ch=None), self._unconfirmed()
+        older = tuple(hold_id for hold_id in self._named if hold_id not in named)
         if older:
-            # Named, and since then over.
+            # A line with `run` ends their release and keeps their names.
             yield replace(last, desired="run", hold_id=None, named=older)
         if self._release is not None:
-            yield replace(last, named=self._asked(), ch=self._release.ch)
+            yield replace(last, named=named, ch=self._release.ch)
         yield last
 
-    def _asked(self) -> tuple[str, ...]:
-        """Holds that the open release has named."""
+    def _unconfirmed(self) -> tuple[str, ...]:
+        """Holds that the unconfirmed release has named."""
         return () if self._release is None else self._release.named or ()

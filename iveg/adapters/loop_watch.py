@@ -1,4 +1,4 @@
-"""CPU of each turn of the loop, whatever else the machine does."""
+"""CPU of each turn of the loop, without that of other programs."""
 
 import asyncio
 from collections.abc import Callable
@@ -8,19 +8,17 @@ from iveg.adapters import clock
 BEAT_S = 0.02
 
 
-async def watch_loop(
-    note: Callable[[float], None], read_cpu: Callable[[], float] = clock.thread_cpu
-) -> None:
+async def watch_loop(note: Callable[[float], None]) -> None:
     """Measure until cancelled.
 
-    A beat comes due every 20 ms.  What it finds late was held up by one turn, whose CPU
-    is that of the loop's thread since the beat before, less those 20 ms at most.
+    A beat is due every 20 ms.  A late beat was held up by one turn of the loop.  That
+    turn took at most the CPU of the loop's thread since the beat before, and at least
+    20 ms less.
 
     Args:
-        note: Called with the CPU that the longest turn since a beat took (s).
-        read_cpu: Reads the CPU that the calling thread has used (s).
+        note: Called with a lower bound of the CPU of the longest turn since a beat (s).
     """
     while True:
-        began = read_cpu()
+        began = clock.thread_cpu()
         await asyncio.sleep(BEAT_S)
-        note(read_cpu() - began - BEAT_S)
+        note(clock.thread_cpu() - began - BEAT_S)

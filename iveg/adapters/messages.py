@@ -1,7 +1,7 @@
 """Messages to people outside the page: a settings file of addresses, and apprise.
 
-An address holds passwords and tokens, so that nothing of it is logged: what apprise and
-its HTTP library say goes nowhere.
+An address holds passwords and tokens, so no part of it is logged: the log lines of
+apprise and its HTTP library are dropped.
 """
 
 import asyncio
@@ -40,56 +40,56 @@ class _FileTable(Table):
 
 
 def load_messages(file: str) -> MessagePlan:
-    """The plan of a file; nobody gets messages where none is named.
+    """Plan of a file; without a file nobody gets messages.
 
     Raises:
-        DataFileError: the file cannot be used; of an address it says the place alone.
+        DataFileError: the file cannot be used; of an address it names only the place.
     """
     if not file:
         return MessagePlan()
-    text = read_text(file)
-    page = read_table(text, file, _FileTable)
-    found = []
+    page = read_table(read_text(file), file, _FileTable)
+    addresses = []
     for key, rows in (("address", page.address), ("escalation", page.escalation)):
         for index, row in enumerate(rows):
             if _opened(row.url) is None:
                 raise complaint(file, (key, index, "url"), "is not one of apprise")
-            found.append(Address(row.name, row.url, row.least, key == "escalation"))
-    return MessagePlan(tuple(found), page.escalate_after_min * 60, page.language)
+            addresses.append(Address(row.name, row.url, row.least, key == "escalation"))
+    return MessagePlan(tuple(addresses), page.escalate_after_min * 60, page.language)
 
 
-class AppriseSender:
-    """Sends by apprise; each message in a thread that ends with the process."""
+async def send_message(to: Address, text: MessageText) -> str | None:
+    """Send a message by apprise; returns the reason of a failure, or None.
 
-    async def send(self, to: Address, text: MessageText) -> str | None:
-        """Why an address did not take a message; None where it did."""
-        loop = asyncio.get_running_loop()
-        answer: asyncio.Future[str | None] = loop.create_future()
+    Each message has a thread, which ends with the process at the latest.
+    """
+    loop = asyncio.get_running_loop()
+    answer: asyncio.Future[str | None] = loop.create_future()
 
-        def tell(failed: str | None) -> None:
-            if not answer.done():
-                answer.set_result(failed)
+    def tell(failed: str | None) -> None:
+        if not answer.done():
+            answer.set_result(failed)
 
-        def work() -> None:
-            try:
-                way = _opened(to.url)
-                is_taken = way and way.notify(title=text.title, body=text.body)
-                failed = None if is_taken else "not taken"
-            except Exception as error:
-                failed = type(error).__name__
-            with contextlib.suppress(RuntimeError):  # the loop has ended
-                loop.call_soon_threadsafe(tell, failed)
+    def work() -> None:
+        try:
+            service = _opened(to.url)
+            is_taken = service and service.notify(title=text.title, body=text.body)
+            failed = None if is_taken else "not taken"
+        except Exception as error:
+            # The name of the error alone: its text may hold the address.
+            failed = type(error).__name__
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            loop.call_soon_threadsafe(tell, failed)
 
-        threading.Thread(target=work, name="message", daemon=True).start()
-        return await answer
+    threading.Thread(target=work, name="message", daemon=True).start()
+    return await answer
 
 
 def _opened(url: str) -> "Apprise | None":
-    # Takes 45 MB and a second, which only sites with messages pay.
+    # Imported here: it takes 45 MB and a second, which only sites with messages pay.
     from apprise import Apprise
 
     for name in ("apprise", "urllib3"):
         logging.getLogger(name).propagate = False
         logging.getLogger(name).handlers = [logging.NullHandler()]
-    way = Apprise()
-    return way if way.add(url) else None
+    service = Apprise()
+    return service if service.add(url) else None

@@ -1,9 +1,9 @@
-"""MQTT: a link of one connection or more that reconnects by itself.
+"""MQTT: a link of at least one connection that reconnects by itself.
 
-``run`` connects, subscribes and hands every message on as it is read; when the broker
-goes it tries again with a growing, jittered pause.  ``publish`` waits for the broker's
-confirmation (QoS 1) and raises; ``enqueue`` keeps only the newest message of each
-topic, for telemetry.
+``run`` connects, subscribes and hands every message on as it is read; after a loss it
+tries again with a growing, jittered pause.  ``publish`` waits for the confirmation of
+the broker (QoS 1) and raises; ``enqueue`` keeps only the newest message of each topic,
+for telemetry.
 """
 
 import asyncio
@@ -15,6 +15,7 @@ import ssl
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
+from typing import Any
 from urllib.parse import unquote, urlsplit
 
 import aiomqtt
@@ -54,10 +55,11 @@ class TlsFiles:
 
 
 NO_FILES = TlsFiles()
+_NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
 
 # --- the address ------------------------------------------------------------------
 #
-# The address of a broker, and with what a connection to it is made.
+# Address of a broker, and its client.
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,21 +89,28 @@ class BrokerAddress:
             files,
         )
 
-    def context(self) -> ssl.SSLContext | None:
-        """Context of TLS, from the files as they are now; None without TLS.
+    def client(self, **options: Any) -> aiomqtt.Client:
+        """Client that is not connected yet; TLS from the files as they are now.
 
         Raises:
             OSError: a file is missing or is no certificate.
         """
-        return self.files.context() if self.tls else None
+        return aiomqtt.Client(
+            self.host,
+            self.port,
+            username=self.user,
+            password=self.password,
+            tls_context=self.files.context() if self.tls else None,
+            socket_options=_NODELAY,
+            **options,
+        )
 
 
 # --- the connection ---------------------------------------------------------------
 
 _log = logging.getLogger(__name__)
-# aiomqtt's own: it complains of every message that waits for its confirmation.
+# aiomqtt warns of every message that waits for its confirmation.
 logging.getLogger("mqtt").setLevel(logging.ERROR)
-NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.2, 2.0
 _KEEPALIVE_S = 5
 _ANSWERED_WITHIN_S, _CONFIRMED_WITHIN_S = 5.0, 1.5
@@ -112,9 +121,13 @@ class MqttLink:
 
     Args:
         address: The broker.
-        name: Says in logs whose connection this is; ids stay random.
-        subscriptions: Topic filter → QoS, asked for on every connect.
-        on_message: Called in the loop with topic and payload; must not block.
+        name: Names the connection in logs; client ids stay random.
+        subscriptions: Topic filter → QoS, subscribed to on every connect.
+        on_message: Called in the loop with topic and payload; must not block.  None:
+            the link only sends.
+
+    Attributes:
+        drained: Set while no offered message waits for the socket.
     """
 
     def __init__(
@@ -122,26 +135,24 @@ class MqttLink:
         address: BrokerAddress,
         name: str,
         subscriptions: Mapping[str, int] | None = None,
-        on_message: Callable[[str, bytes], None] = lambda _topic, _payload: None,
+        on_message: Callable[[str, bytes], None] | None = None,
     ) -> None:
-        self._address = address
-        self._name = name
+        self._address, self._name = address, name
         self.attach(subscriptions or {}, on_message)
         self._client: aiomqtt.Client | None = None
         self._offered: dict[str, tuple[bytes, int]] = {}
-        self._wake, self._drained = asyncio.Event(), asyncio.Event()
-        self._drained.set()
-        self._loss_told = False
-        self._mistake: Exception | None = None
+        self._wake, self.drained = asyncio.Event(), asyncio.Event()
+        self.drained.set()
+        self._loss_logged = False
+        self._reader_error: Exception | None = None
         self.replaced = 0
-        """Offered messages that a newer one overtook."""
+        """Offered messages that a newer one of their topic replaced."""
 
     def attach(
         self,
         subscriptions: Mapping[str, int],
-        on_message: Callable[[str, bytes], None],
-        on_connect: Callable[[], None] = lambda: None,
-        on_loss: Callable[[], None] = lambda: None,
+        on_message: Callable[[str, bytes], None] | None,
+        on_change: Callable[[bool], None] | None = None,
         on_stored: Callable[[str, bytes], None] | None = None,
         apart: Sequence[Mapping[str, int]] = (),
     ) -> None:
@@ -149,19 +160,18 @@ class MqttLink:
 
         Args:
             subscriptions: As above, and so for the others.
-            apart: Subscriptions that have a connection of their own each; all come
-                and go together.  A turn of the loop reads one message a connection,
-                so a flood on one delays no message of another.
+            apart: Subscriptions with a connection of their own each; all connections
+                come and go together.  A turn of the loop reads one message for each
+                connection, so a flood on one delays no message of another.
             on_message: Called with each message.
-            on_connect: Called after every (re)connect, subscriptions in place.
-            on_loss: Called once when a connection is lost.
-            on_stored: Called with what the broker retained; None: ``on_message`` is.
+            on_change: Called with True after every (re)connect, subscriptions in place,
+                and with False once when a connection is lost.
+            on_stored: Called with messages that the broker retained; None:
+                ``on_message`` is.
         """
-        # Orders leave by the last of these connections.
+        # The last connection carries the orders.
         self._subscriptions = (*apart, subscriptions)
-        self._on_message = on_message
-        self._on_connect = on_connect
-        self._on_loss = on_loss
+        self._on_message, self._on_change = on_message, on_change
         self._on_stored = on_stored or on_message
 
     @property
@@ -171,7 +181,7 @@ class MqttLink:
 
     @property
     def connected(self) -> bool:
-        """Whether the broker has accepted us and has not gone since."""
+        """Whether the broker has accepted all connections and none is lost since."""
         return self._client is not None
 
     async def run(self) -> None:
@@ -182,42 +192,47 @@ class MqttLink:
                 await self._session()
             except (aiomqtt.MqttError, OSError) as error:
                 _heed_cancellation()
-                if self._mistake is not None:
-                    raise self._mistake from None
-                if not self._loss_told:
+                # A reader that failed would fail at the next message, too.
+                if self._reader_error is not None:
+                    raise self._reader_error from None
+                if not self._loss_logged:
                     _log.warning("%s: broker lost: %s", self._name, error)
-                    self._loss_told = True
+                    self._loss_logged = True
             if self._client is not None:
                 self._client = None
                 pause = _FIRST_PAUSE_S
-                self._on_loss()
-            await asyncio.sleep(pause * random.uniform(0.5, 1.0))  # noqa: S311 - jitter
+                if self._on_change is not None:
+                    self._on_change(False)
+            # Jitter: after a restart of the broker not all programs connect at once.
+            await asyncio.sleep(pause * random.uniform(0.5, 1.0))  # noqa: S311
             pause = min(_LONGEST_PAUSE_S, 2 * pause)
 
     async def _session(self) -> None:
-        """Connect and serve; ends by an error, or by being cancelled."""
+        """Connect and serve, until an error or a cancellation."""
         ends = list[asyncio.Future[None]]()
         try:
             async with AsyncExitStack() as connections:
                 for subscriptions in self._subscriptions:
                     client = await connections.enter_async_context(self._new_client())
-                    ends.append(asyncio.ensure_future(_end_of(client)))
+                    ends.append(asyncio.ensure_future(_wait_for_end(client)))
                     for topic_filter, qos in subscriptions.items():
                         await client.subscribe(topic_filter, qos=qos)
+                # One may have been swallowed while connecting.
                 _heed_cancellation()
                 await self._serve(client, ends)
         finally:
-            # Each hears of its own end, or asyncio complains of an error nobody took.
+            # asyncio complains of each error that nobody has fetched.
             await asyncio.gather(*ends, return_exceptions=True)
 
     async def _serve(
         self, client: aiomqtt.Client, ends: Sequence[asyncio.Future[None]]
     ) -> None:
-        """Hand on and send, until a connection is lost."""
+        """Receive and send, until a connection is lost."""
         self._client = client
-        self._loss_told = False
+        self._loss_logged = False
         _log.info("%s: connected to the broker", self._name)
-        self._on_connect()
+        if self._on_change is not None:
+            self._on_change(True)
         sender = asyncio.create_task(
             self._send_offered(client), name=f"mqtt-send-{self._name}"
         )
@@ -228,28 +243,22 @@ class MqttLink:
             sender.cancel()
 
     def _new_client(self) -> aiomqtt.Client:
-        address = self._address
-        return aiomqtt.Client(
-            address.host,
-            address.port,
-            username=address.user,
-            password=address.password,
+        return self._address.client(
             keepalive=_KEEPALIVE_S,
             timeout=_ANSWERED_WITHIN_S,
-            tls_context=address.context(),
-            socket_options=NODELAY,
-            queue_type=_handing_to(self._hand_over),
+            queue_type=_queue_type(self._hand_over),
             # A STOP never waits until the broker has confirmed telemetry.
             max_inflight_messages=0,
         )
 
     def _hand_over(self, message: aiomqtt.Message) -> None:
-        """A mistake of ours in here must end ``run``, and not the connection alone."""
-        hear = self._on_stored if message.retain else self._on_message
+        """Call the reader of a message; its error ends ``run``, not the connection."""
+        reader = self._on_stored if message.retain else self._on_message
         try:
-            hear(message.topic.value, message.payload)
+            if reader is not None:
+                reader(message.topic.value, message.payload)
         except Exception as error:
-            self._mistake = error
+            self._reader_error = error
             raise
 
     async def _send_offered(self, client: aiomqtt.Client) -> None:
@@ -259,15 +268,15 @@ class MqttLink:
             while self._offered:
                 offered, self._offered = self._offered, {}
                 await self._send(client, offered)
-            self._drained.set()
+            self.drained.set()
 
     async def _send(
         self, client: aiomqtt.Client, messages: Mapping[str, tuple[bytes, int]]
     ) -> None:
-        """Return when the socket (QoS 0) or the broker (QoS 1) has these, or late.
+        """Return when the socket (QoS 0) or broker (QoS 1) has them, or after 5 s.
 
-        A broker that is slow to confirm may still be there; when it is gone, the
-        session ends and its sender with it.
+        A broker that confirms late may still be connected.  If it is not, the session
+        ends and its sender with it.
         """
         sending = asyncio.gather(
             *(
@@ -278,31 +287,27 @@ class MqttLink:
         )
         failed: list[BaseException]
         try:
-            # One timer for all: each of aiomqtt's own is a task.
+            # One timer for all: aiomqtt's own timer costs a task for each message.
             async with asyncio.timeout(_ANSWERED_WITHIN_S):
                 failed = list(filter(None, await sending))
         except TimeoutError as error:
             failed = [error]
         if failed:
             count = len(messages)
-            _log.debug("%s: not all of %d sent: %r", self._name, count, failed[0])
+            _log.debug("%s: %d messages not all sent: %r", self._name, count, failed[0])
 
     def enqueue(self, topic: str, payload: bytes, qos: int = 0) -> None:
-        """Send when possible; a newer message of the topic takes its place."""
+        """Send when possible; a newer message of the topic replaces this one."""
         if topic in self._offered:
             self.replaced += 1
         self._offered[topic] = (payload, qos)
-        self._drained.clear()
+        self.drained.clear()
         self._wake.set()
-
-    async def drained(self) -> None:
-        """Return when the socket has everything that was offered."""
-        await self._drained.wait()
 
     async def publish(
         self, topic: str, payload: bytes, qos: int = 1, *, retain: bool = False
     ) -> None:
-        """Send now; at QoS 1 return when the broker has it.
+        """Send now; at QoS 1 return when the broker has confirmed.
 
         Raises:
             HopError: not connected, or the broker did not confirm.
@@ -320,12 +325,12 @@ class MqttLink:
         _heed_cancellation()
 
 
-def _handing_to(
+def _queue_type(
     take: Callable[[aiomqtt.Message], None],
 ) -> type[asyncio.Queue[aiomqtt.Message]]:
-    """The client's queue that keeps nothing, so that no message grows old in it.
+    """Type of a client's queue that keeps nothing: no message grows old in it.
 
-    Its iterator costs a task a message, a third of all that reading one costs.
+    aiomqtt's iterator costs a task for each message, a third of reading a message.
     """
 
     class Intake(asyncio.Queue[aiomqtt.Message]):
@@ -335,18 +340,18 @@ def _handing_to(
     return Intake
 
 
-async def _end_of(client: aiomqtt.Client) -> None:
+async def _wait_for_end(client: aiomqtt.Client) -> None:
     """Wait for the end of the connection.
 
     Raises:
         MqttError: it has ended.
     """
     async for _ in client.messages:
-        """None comes this way."""
+        """No message comes this way."""
 
 
 def _heed_cancellation() -> None:
-    """Raise the cancellation that somebody asked for.
+    """Raise the cancellation that this task has been sent.
 
     Before Python 3.12 ``asyncio.wait_for``, which aiomqtt uses, may swallow a
     cancellation that meets its result; the task would live on and the part never end.
@@ -358,27 +363,20 @@ def _heed_cancellation() -> None:
 
 # --- one message there and back ---------------------------------------------------
 #
-# The MQTT side of ``iveg doctor``: one message to the broker and back.
-#
-# It reports the reason of a failure where a running iVeg tries again.
+# The MQTT side of ``iveg doctor``.  It reports the reason of a failure, where a running
+# iVeg tries again.
 
 
-async def publish_and_hear(address: BrokerAddress, topic: str, payload: bytes) -> None:
-    """Publish a message at QoS 1; return when it was heard from the broker.
+async def publish_and_receive(
+    address: BrokerAddress, topic: str, payload: bytes
+) -> None:
+    """Publish a message at QoS 1; return when the broker has sent it back.
 
     Raises:
         HopError: the broker is away or refuses the user.
     """
-    client = aiomqtt.Client(
-        address.host,
-        address.port,
-        username=address.user,
-        password=address.password,
-        tls_context=address.context(),
-        socket_options=NODELAY,
-    )
     try:
-        async with client:
+        async with address.client() as client:
             await client.subscribe(topic, qos=1)
             await client.publish(topic, payload, qos=1)
             async for message in client.messages:

@@ -1,107 +1,122 @@
-"""OpenID Connect: discovery, the code flow with PKCE, and ID tokens that are verified.
+"""OpenID Connect by Authlib: the code flow with PKCE, and ID tokens that are verified.
 
-The only importer of authlib and of joserfc, which comes with it (extra ``sso``).
-Authlib's Starlette client is not used: it wants httpx2 and sessions in signed cookies.
+The only importer of authlib, joserfc and httpx2 (extra ``sso``).  Authlib gets checked
+addresses from a provider's description, never the description.  Authlib would take its
+members as settings of the client, such as PKCE and proxy, accept each algorithm in it,
+and keep a withdrawn key until a restart.
 Sources: OpenID Connect Core 1.0, 3.1; Discovery 1.0; RFC 7636.
 """
 
 from typing import Any, Final
-from urllib.parse import urlencode, urlsplit
 
-from authlib.oauth2.rfc7636 import create_s256_code_challenge
-from authlib.oidc.core import CodeIDToken
+import httpx2
+from authlib.integrations.starlette_client import OAuth, OAuthError
 from authlib.oidc.discovery import get_well_known_url
-from joserfc import jwt
 from joserfc.errors import JoseError
-from joserfc.jwk import KeySet
 
-from iveg.adapters.identity_provider import (
-    HOP,
-    Attempt,
-    IdentityProvider,
-    Vouched,
-    text_of,
-)
+from iveg.adapters.bounded_json import BoundedJson
+from iveg.adapters.identity_provider import HOP, Attempt, Client
 from iveg.domain.errors import HopError, SignOnError
 from iveg.domain.records import Json
+from iveg.domain.wire import clean_text
 from iveg.setting_types import is_safe_address
 
 ALGORITHMS: Final = tuple(
     f"{kind}{bits}" for kind in ("RS", "PS", "ES") for bits in (256, 384, 512)
 )
-"""Signatures that count: of nobody else's making, so neither ``none`` nor ``HS256``."""
+"""Accepted signatures: asymmetric alone, so neither ``none`` nor ``HS256``."""
 LEEWAY_S: Final = 30
 """Greatest error of the provider's clock (s)."""
 _ENDPOINTS: Final = ("authorization_endpoint", "token_endpoint", "jwks_uri")
+_CARRIED: Final = ("Authorization", "Content-Type")
+"""Headers of Authlib that are sent; ``BoundedJson`` sets all others."""
 
 
-class OpenIdProvider(IdentityProvider):
-    """A provider that says by discovery where everything is."""
+class OpenIdProvider:
+    """Provider that vouches for people; without an answer methods raise HopError.
+
+    Its addresses come from OpenID Connect Discovery.
+    """
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._http = BoundedJson(HOP)
 
     async def address(self, attempt: Attempt) -> str:
-        """Where a browser goes to sign in, anew each time.
+        """Address at which a browser signs in, with the password each time.
 
-        Tablets are shared: after a sign-out of iVeg nobody comes in by a session that
-        the provider still has in this browser.
+        Tablets are shared: after a sign-out of iVeg the next person must not come in by
+        a session that the provider still has in this browser.
         """
-        url: str = (await self._discover())["authorization_endpoint"]
-        query = {
-            "response_type": "code",
-            "client_id": self.client.client_id,
-            "redirect_uri": attempt.back,
-            "state": attempt.state,
-            "scope": self.client.scopes,
-            "prompt": "login",
-            "nonce": attempt.nonce,
-            "code_challenge": create_s256_code_challenge(attempt.verifier),
-            "code_challenge_method": "S256",
-        }
-        return f"{url}{'&' if urlsplit(url).query else '?'}{urlencode(query)}"
+        app = self._app(await self._discover())
+        authorization = await app.create_authorization_url(
+            attempt.back,
+            state=attempt.state,
+            nonce=attempt.nonce,
+            code_verifier=attempt.verifier,
+            prompt="login",
+        )
+        return str(authorization["url"])
 
-    async def vouch(self, attempt: Attempt, code: str) -> Vouched:
-        """Exchange the code of an attempt, and verify what comes for it."""
+    async def vouch(self, attempt: Attempt, code: str) -> Json:
+        """Exchange a code for claims about a person, with ``iss`` and ``sub``.
+
+        Raises:
+            SignOnError: the code or the ID token proves nothing.
+        """
         about = await self._discover()
-        answer = await self._redeem(about["token_endpoint"], attempt, code)
-        token, access = text_of(answer, "id_token"), answer.get("access_token")
-        keys = await self._http.get(about["jwks_uri"])
-        claims = self._verified(token, attempt.nonce, access, keys.body)
-        user: Json = {}
-        if "userinfo_endpoint" in about and isinstance(access, str):
-            bearer = {"Authorization": f"Bearer {access}"}
-            info = await self._http.get(about["userinfo_endpoint"], headers=bearer)
-            # Core, 5.3.2: without the same `sub` it must not be used.
-            if info.is_success and info.body.get("sub") == claims["sub"]:
-                user = info.body
-        # What is signed comes last, and wins.
-        return Vouched(text_of(claims, "sub"), {**user, **claims})
-
-    async def _redeem(self, url: str, attempt: Attempt, code: str) -> Json:
-        """Exchange a code at the token endpoint (RFC 6749, 4.1.3; RFC 7636, 4.5)."""
-        form = {
-            "grant_type": "authorization_code",
-            "code": code,
-            "redirect_uri": attempt.back,
-            "code_verifier": attempt.verifier,
+        app = self._app(about)
+        required = {
+            "iss": {"essential": True, "value": self._client.issuer},
+            "aud": {"essential": True, "value": self._client.client_id},
+            "sub": {"essential": True},
         }
-        login = None
-        if self.client.secret:
-            login = self.client.client_id, self.client.secret
-        else:
-            form["client_id"] = self.client.client_id
-        answer = await self._http.post(url, form, login)
-        if not answer.is_success:
-            raise SignOnError("untrusted", f"the code was refused: {answer.refusal}")
-        return answer.body
+        try:
+            token = await app.fetch_access_token(
+                attempt.back, code=code, code_verifier=attempt.verifier
+            )
+            claims = await app.parse_id_token(
+                token, attempt.nonce, required, leeway=LEEWAY_S
+            )
+        except OAuthError as error:
+            reason = clean_text(str(error.error)[:40])
+            raise SignOnError("untrusted", f"the code was refused: {reason}") from error
+        except httpx2.HTTPStatusError as error:
+            status = error.response.status_code
+            raise SignOnError("untrusted", f"no ID token, but {status}") from error
+        except (
+            JoseError,
+            httpx2.InvalidURL,
+            LookupError,
+            TypeError,
+            ValueError,
+        ) as error:
+            reason = type(error).__name__
+            raise SignOnError("untrusted", f"ID token: {reason}") from error
+        if claims is None:
+            raise SignOnError("untrusted", "no ID token in the answer")
+        if "userinfo_endpoint" in about and "access_token" in token:
+            bearer = {"Authorization": f"Bearer {token['access_token']}"}
+            url = about["userinfo_endpoint"]
+            info = await self._http.ask("GET", url, headers=bearer)
+            # Core, 5.3.2: user info without the same `sub` must not be used.
+            if info.is_success and info.body.get("sub") == claims["sub"]:
+                # The signed claims come last, and win.
+                return {**info.body, **claims}
+        return dict(claims)
+
+    async def close(self) -> None:
+        """Close connections."""
+        await self._http.close()
 
     async def _discover(self) -> Json:
-        """The provider's description, whose addresses may be used. Raises HopError."""
-        answer = await self._http.get(
-            get_well_known_url(self.client.issuer, external=True)
-        )
+        """The provider's description, with checked addresses.  Raises HopError."""
+        url = get_well_known_url(self._client.issuer, external=True)
+        answer = await self._http.ask("GET", url)
         about = answer.body
         if not answer.is_success:
             raise HopError(HOP, f"{answer.status} to its own description")
-        if about.get("issuer") != self.client.issuer:
+        if about.get("issuer") != self._client.issuer:
             raise HopError(HOP, "says that it is another issuer")
         for name in {*_ENDPOINTS, *about.keys() & {"userinfo_endpoint"}}:
             address = about.get(name)
@@ -109,20 +124,36 @@ class OpenIdProvider(IdentityProvider):
                 raise HopError(HOP, f"its {name} cannot be used")
         return about
 
-    def _verified(self, token: str, nonce: str, access: object, keys: Json) -> Json:
-        """The claims of an ID token. Raises SignOnError: it proves nothing."""
-        client_id = self.client.client_id
-        expected = {"nonce": nonce, "client_id": client_id, "access_token": access}
-        required: dict[str, Any] = {
-            "iss": {"essential": True, "value": self.client.issuer},
-            "aud": {"essential": True, "value": client_id},
-        }
-        try:
-            known = KeySet.import_key_set(keys)  # type: ignore[arg-type]
-            read = jwt.decode(token, known, algorithms=ALGORITHMS)
-            claims = CodeIDToken(read.claims, read.header, required, expected)
-            claims.validate(leeway=LEEWAY_S)
-        except (JoseError, ValueError, TypeError, KeyError) as error:
-            why = type(error).__name__
-            raise SignOnError("untrusted", f"ID token: {why}") from error
-        return dict(claims)
+    def _app(self, about: Json) -> Any:
+        """Authlib's client for one step; a longer life would keep withdrawn keys."""
+        return OAuth().register(
+            HOP,
+            client_id=self._client.client_id,
+            client_secret=self._client.secret,
+            authorize_url=about["authorization_endpoint"],
+            access_token_url=about["token_endpoint"],
+            jwks_uri=about["jwks_uri"],
+            id_token_signing_alg_values_supported=ALGORITHMS,
+            client_kwargs={
+                "scope": self._client.scopes,
+                "code_challenge_method": "S256",
+                "transport": _BoundedTransport(self._http),
+            },
+        )
+
+
+class _BoundedTransport(httpx2.AsyncBaseTransport):
+    """Authlib's requests over ``BoundedJson``: bounded in time and size."""
+
+    def __init__(self, http: BoundedJson) -> None:
+        self._http = http
+
+    async def handle_async_request(self, request: httpx2.Request) -> httpx2.Response:
+        sent = request.headers
+        answer = await self._http.ask(
+            request.method,
+            str(request.url),
+            content=await request.aread(),
+            headers={name: sent[name] for name in _CARRIED if name in sent},
+        )
+        return httpx2.Response(answer.status, json=answer.body)

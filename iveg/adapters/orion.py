@@ -1,7 +1,7 @@
-"""Requests to Orion: commands, entities, subscriptions, registrations.
+"""Requests to Orion: commands, entities, subscriptions.
 
-Orion's 204 to a command proves nothing: it also answers so when the command went
-nowhere (docs/fiware.md).  The evidence is the robot's own answer.
+Orion's 204 to a command proves nothing: Orion also answers so when the command reached
+nobody (docs/fiware.md).  The evidence is the robot's own answer.
 """
 
 from collections.abc import Mapping
@@ -15,6 +15,10 @@ from iveg.adapters.fiware_http import (
 from iveg.domain.errors import HopError
 from iveg.ngsi import names
 
+SUBSCRIPTIONS, REGISTRATIONS = "/v2/subscriptions", "/v2/registrations"
+ROBOTS = {"type": names.ROBOT_TYPE}
+"""Query for entities of robots alone."""
+_COMMAND_TIMEOUT_S = 1.5
 ROBOT_ATTRIBUTES = (
     names.ODOMETRY,
     names.LIDAR,
@@ -28,7 +32,7 @@ ROBOT_ATTRIBUTES = (
     names.GOAL_INFO,
     *names.ALGORITHM_1,
 )
-"""Attributes read of a robot.  Never ``cmd`` or ``goal``, for which Orion would
+"""Attributes of a robot that are read.  Never ``cmd`` or ``goal``: for them Orion would
 query the agent."""
 
 
@@ -50,20 +54,18 @@ class OrionClient(FiwareHttp):
         self,
         robot_id: str,
         value: Mapping[str, object],
-        timeout_s: float = 1.5,
         name: str = names.COMMAND,
     ) -> None:
         """Ask Orion to pass a command on.
 
-        ``cmd`` goes alone, with ``?type=Robot`` and as an update: anything else makes
-        Orion store or lose it and still answer 204.  A return therefore proves
+        ``cmd`` goes alone, with ``?type=Robot`` and as an update: else Orion stores or
+        loses it and still answers 204.  A return therefore proves
         nothing; an error may still mean that the command arrives later.
 
         Args:
             robot_id: The robot.
             value: The command (docs/interfaces/commands.md).
-            timeout_s: How long Orion may take (s).
-            name: Of the NGSI command.
+            name: Name of the NGSI command.
 
         Raises:
             HopError: Orion did not take it; 404 also means that the agent is away.
@@ -71,9 +73,9 @@ class OrionClient(FiwareHttp):
         await self.ask(
             "PATCH",
             f"/v2/entities/{robot_id}/attrs",
-            query={"type": names.ROBOT_TYPE},
+            query=ROBOTS,
             body={name: {"type": "command", "value": dict(value)}},
-            timeout_s=timeout_s,
+            timeout_s=_COMMAND_TIMEOUT_S,
         )
 
     async def read_robots(self) -> list[Document]:
@@ -82,8 +84,7 @@ class OrionClient(FiwareHttp):
         Raises:
             HopError: Orion does not answer.
         """
-        query = {
-            "type": names.ROBOT_TYPE,
+        query = ROBOTS | {
             "attrs": ",".join(ROBOT_ATTRIBUTES),
             "orderBy": "id",
             "options": "skipForwarding",
@@ -91,7 +92,7 @@ class OrionClient(FiwareHttp):
         return await self.read_all("/v2/entities", query)
 
     async def read_probe(self) -> Document | None:
-        """The heartbeat probe as Orion has it; None where none ever came so far.
+        """The heartbeat probe as Orion has it; None where none has ever arrived.
 
         Raises:
             HopError: Orion does not answer at once.
@@ -102,31 +103,14 @@ class OrionClient(FiwareHttp):
             PROBE_TIMEOUT_S,
         )
 
-    async def delete_attribute(self, robot_id: str, name: str) -> bool:
-        """Delete an attribute of a robot; whether there was one.
-
-        Raises:
-            HopError: Orion does not answer.
-        """
-        response = await self.ask(
-            "DELETE",
-            f"/v2/entities/{robot_id}/attrs/{name}",
-            query={"type": names.ROBOT_TYPE},
-            also=(404,),
-        )
-        return response.status_code != 404
-
     async def has_attribute(self, robot_id: str, name: str) -> bool:
         """Whether Orion itself keeps an attribute of a robot.
 
         Raises:
             HopError: Orion does not answer.
         """
-        query = {
-            "type": names.ROBOT_TYPE,
-            "attrs": name,
-            "options": "skipForwarding",
-        }
+        # Else Orion would answer with the attribute of the agent's registration.
+        query = ROBOTS | {"attrs": name, "options": "skipForwarding"}
         return name in (await self._read_entity(robot_id, query) or {})
 
     async def _read_entity(
@@ -140,61 +124,14 @@ class OrionClient(FiwareHttp):
         entity = self.read_object(response)
         return None if response.status_code == 404 else entity
 
-    # --- subscriptions and registrations ------------------------------------------
-
-    async def read_registrations(self) -> list[Document]:
-        """Every registration of our tenant.
-
-        Raises:
-            HopError: Orion does not answer.
-        """
-        return await self.read_all("/v2/registrations")
-
-    async def delete_registration(self, registration_id: str) -> None:
-        """Delete a registration; one that is gone already is no error.
-
-        Raises:
-            HopError: Orion does not answer.
-        """
-        path = f"/v2/registrations/{registration_id}"
-        await self.ask("DELETE", path, also=(404,))
-
-    async def read_subscriptions(self) -> list[Document]:
-        """Every subscription of our tenant.
-
-        Raises:
-            HopError: Orion does not answer.
-        """
-        return await self.read_all("/v2/subscriptions")
-
     async def create_subscription(self, document: Document) -> str:
-        """Subscribe; the id of the subscription.
+        """Make a subscription; returns its id.
 
         Raises:
-            HopError: Orion does not take it.
+            HopError: Orion refuses it.
         """
-        response = await self.ask("POST", "/v2/subscriptions", body=dict(document))
+        response = await self.ask("POST", SUBSCRIPTIONS, body=document)
         made = str(response.headers.get("Location", "").rpartition("/")[2])
         if not made:
             raise HopError("orion", "took a subscription and did not say where it is")
         return made
-
-    async def update_subscription(
-        self, subscription_id: str, changes: Document
-    ) -> None:
-        """Change a subscription; each part that is named replaces the old one whole.
-
-        Raises:
-            HopError: Orion does not take it.
-        """
-        path = f"/v2/subscriptions/{subscription_id}"
-        await self.ask("PATCH", path, body=dict(changes))
-
-    async def delete_subscription(self, subscription_id: str) -> None:
-        """Delete a subscription; one that is gone already is no error.
-
-        Raises:
-            HopError: Orion does not answer.
-        """
-        path = f"/v2/subscriptions/{subscription_id}"
-        await self.ask("DELETE", path, also=(404,))

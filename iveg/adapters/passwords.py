@@ -23,22 +23,22 @@ _T = TypeVar("_T")
 _MOST_WAITING: Final = 16
 _NICENESS: Final = 10
 _KIB, _PASSES, _LANES = 19 * 1024, 2, 1
-"""OWASP Password Storage Cheat Sheet."""
+"""Memory (KiB), passes and lanes of the OWASP Password Storage Cheat Sheet."""
 _NOBODYS: Final = (
     f"$argon2id$v=19$m={_KIB},t={_PASSES},p={_LANES}${'A' * 22}${'A' * 43}"
 )
-"""A hash that no password has, and that takes as long as any."""
+"""Hash that fits no password; its check takes as long as any."""
 
 
 class Passwords:
-    """Hashes and checks passwords one after the other; at most sixteen wait."""
+    """Hashes and checks passwords one after the other; sixteen at most wait."""
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1, "passwords", _step_back)
         self._waiting = 0
 
     async def hashed(self, password: str) -> str:
-        """The hash to keep (PHC string format).
+        """Hash of a password, for storage (PHC string format).
 
         Raises:
             BusyError: too many wait.
@@ -46,16 +46,15 @@ class Passwords:
         return await self._run(_hash, password)
 
     async def fits(self, password: str, kept: str) -> bool:
-        """Whether a password is the one whose hash is kept.
+        """Whether a password has the stored hash.
 
-        An empty hash takes the same time as a wrong password: nobody learns by it which
-        names exist.
+        An empty hash takes the same time as a wrong password, so that time does not
+        reveal which names exist.
 
         Raises:
             BusyError: too many wait.
         """
-        fits = await self._run(_fits, password, kept or _NOBODYS)
-        return fits and bool(kept)
+        return (await self._run(_fits, password, kept or _NOBODYS)) and bool(kept)
 
     async def _run(self, work: Callable[..., _T], *texts: str) -> _T:
         if self._waiting >= _MOST_WAITING:
@@ -72,7 +71,7 @@ class Passwords:
 
 
 def _step_back() -> None:
-    """Have the system serve the loop first; Linux alone has a niceness of threads."""
+    """Let the loop's thread run first; only Linux has a niceness of threads."""
     if sys.platform == "linux":
         os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
 

@@ -1,11 +1,11 @@
 """Provisioner: keeps the FIWARE data path working by itself.
 
-Devices and subscriptions are made at the start and checked for ever; after a gap one
-read of all robots brings the world up to date; a probe measure goes out every two
+Devices and subscriptions are made at the start and checked for ever.  After a gap a
+read of all robots brings the world up to date.  A probe measure goes out every two
 seconds, because only its return proves that the path works.
 
-Three tasks run beside each other, so that none of them waits for a slow neighbour: the
-probe, a short question to Orion and to the agent, and the repairs.
+The probe, a short question to Orion, one to the agent, and the repairs are tasks of
+their own, so that none of them waits for a slow neighbour.
 """
 
 import asyncio
@@ -21,6 +21,7 @@ from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.reconciler import (
     FiwareSite,
+    OwnSubscriptions,
     ensure_subscriptions,
     provision,
     wanted_for,
@@ -37,16 +38,17 @@ _log = logging.getLogger(__name__)
 _ASK_PERIOD_S, _REPAIR_PERIOD_S = 1.0, 4.0
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 3.0
 _UNANSWERED_S = 30.0
-"""No look at devices for so long after one that got no answer: it may be queued."""
+"""Pause of device checks after a check without an answer (s): the agent may still be
+busy."""
 _DEVICES_PERIOD_S = 12.0
-"""Between two looks at devices while all is well."""
+"""Time between two device checks while all is well (s)."""
 
 
 class Provisioner:
     """Provisioning, subscriptions, reconciling reads and the heartbeat probe.
 
     Attributes:
-        subscription_ids: Ids of our subscriptions.
+        subscriptions: Subscriptions of ours at Orion.
     """
 
     def __init__(
@@ -64,47 +66,24 @@ class Provisioner:
         self._devices_at = self._unanswered_until = 0.0
         self._broken: set[str] = set()
         self._gap = asyncio.Event()
-        self.subscription_ids: frozenset[str] = frozenset()
-        self._former_secrets: frozenset[str] = frozenset()
-        self._is_subscribing = False
-
-    def is_ours(self, subscription_id: str) -> bool:
-        """Whether a notification is one that was asked for.
-
-        Orion may notify of a subscription before it has said its id, and after a
-        restart of ours of those that were made before: while some are made, and until
-        the first are known, each that brings our secret is ours.
-        """
-        return (
-            subscription_id in self.subscription_ids
-            or self._is_subscribing
-            or not self.subscription_ids
-        )
-
-    def is_former(self, secret: str) -> bool:
-        """Whether a secret may be that of an earlier start, which Orion still brings.
-
-        Until Orion has said which subscriptions have our name, any may be.
-        """
-        return secret in self._former_secrets or not self.subscription_ids
+        self.subscriptions = OwnSubscriptions()
 
     async def run(self) -> None:
-        """Until cancelled."""
-        watch, repair = _ASK_PERIOD_S, _REPAIR_PERIOD_S
+        """Run probe, questions and repairs until cancelled."""
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self._send_probes(), name="probe")
-            tasks.create_task(_repeat(self._ask_orion, watch), name="watch-orion")
-            tasks.create_task(_repeat(self._ask_agent, watch), name="watch-agent")
-            work = _repeat(self._repair, repair, self._gap)
-            tasks.create_task(work, name="look-after")
+            tasks.create_task(self._send_probes())
+            tasks.create_task(_repeat(self._ask_orion, _ASK_PERIOD_S))
+            tasks.create_task(_repeat(self._ask_agent, _ASK_PERIOD_S))
+            tasks.create_task(_repeat(self._repair, _REPAIR_PERIOD_S, self._gap))
 
     # --- the heartbeat probe --------------------------------------------------------
 
     async def _send_probes(self) -> None:
-        """At QoS 1: a broker that is there and does nothing says nothing either."""
+        """Publish probes at QoS 1: only a confirmation proves that the broker works."""
         topic = names.measure_topic(self._site.apikey, names.HEARTBEAT_ID)
         while True:
             if not self._link.connected:
+                # The health monitor reports a lost connection by itself.
                 self._health_monitor.mqtt_error = ""
                 await asyncio.sleep(0.1)
                 continue
@@ -112,26 +91,26 @@ class Provisioner:
             now = clock.now()
             stamp = codec.format_stamp(now.wall)
             origin = Origin(self._site.boot, self._probe_seq, stamp)
-            self._health_monitor.sent(origin, now)
-            complaint = ""
+            self._health_monitor.probe.sent(origin, now)
             try:
                 await self._link.publish(topic, codec.write_heartbeat(origin))
+                self._health_monitor.mqtt_error = ""
             except HopError:
-                complaint = "takes messages and does not confirm them"
-            self._health_monitor.mqtt_error = complaint
-            spent = clock.now().mono - now.mono
-            await asyncio.sleep(max(0.1, PROBE_PERIOD_S - spent))
+                silent = "takes messages and does not confirm them"
+                self._health_monitor.mqtt_error = silent
+            duration_s = clock.now().mono - now.mono
+            await asyncio.sleep(max(0.1, PROBE_PERIOD_S - duration_s))
 
     # --- short questions ----------------------------------------------------------
 
     async def _ask_orion(self) -> bool:
-        """Prove that Orion answers, and how far the probe came."""
+        """Check that Orion answers, and read the newest probe that it has stored."""
         monitor, before = self._health_monitor, clock.now()
         try:
             entity = await self._orion.read_probe()
         except HopError as error:
             monitor.orion_error = error.detail
-            return self._tell("orion", error)
+            return self._log_change("orion", error)
         at = clock.now()
         monitor.orion_ok_at = at.mono
         monitor.orion_slow = _slow(at.mono - before.mono)
@@ -141,7 +120,7 @@ class Provisioner:
         if monitor.orion_error:
             monitor.orion_error = ""
             self._gap.set()
-        return self._tell("orion", None)
+        return self._log_change("orion", None)
 
     async def _ask_agent(self) -> bool:
         monitor, before = self._health_monitor, clock.now()
@@ -151,13 +130,13 @@ class Provisioner:
             is_silent = isinstance(error, NoAnswerError)
             monitor.agent_silent = error.detail if is_silent else ""
             monitor.agent_error = "" if is_silent else error.detail
-            return self._tell("iot_agent", error)
+            return self._log_change("iot_agent", error)
         monitor.agent_slow = _slow(clock.now().mono - before.mono)
         if self._agent_trouble:
             monitor.agent_error = monitor.agent_silent = ""
             self._unanswered_until = 0.0
             self._gap.set()
-        return self._tell("iot_agent", None)
+        return self._log_change("iot_agent", None)
 
     @property
     def _agent_trouble(self) -> str:
@@ -166,10 +145,11 @@ class Provisioner:
     # --- devices, subscriptions, reads --------------------------------------------
 
     async def _repair(self) -> bool:
-        """Devices, then subscriptions, then the read that fills the gap.
+        """Check devices, then subscriptions, then read all robots to fill the gap.
 
         Orion sends nothing when a subscription is made, so the read comes last.
         """
+        # First, so that a gap during this repair starts the next one.
         self._gap.clear()
         devices = self._devices_are_due(clock.now())
         if self._health_monitor.orion_error:
@@ -177,15 +157,15 @@ class Provisioner:
         is_whole = True
         if devices and not self._agent_trouble:
             is_whole = await self._try("devices", "iot_agent", self._check_devices)
-        for what, work in (
+        for subject, work in (
             ("subscriptions", self._check_subscriptions),
             ("reading", self._read_robots),
         ):
-            is_whole = await self._try(what, "orion", work) and is_whole
+            is_whole = await self._try(subject, "orion", work) and is_whole
         return is_whole and not self._agent_trouble
 
     def _devices_are_due(self, now: Instant) -> bool:
-        """Never while the agent falls behind: the questions would queue there too."""
+        """Whether to check devices; never while the agent is behind: it adds load."""
         monitor = self._health_monitor
         if monitor.is_overloaded(now) or now.mono < self._unanswered_until:
             return False
@@ -194,16 +174,16 @@ class Provisioner:
     async def _try(
         self, what: str, hop: str, work: Callable[[], Awaitable[None]]
     ) -> bool:
-        """Do one part; a neighbour that is down was reported already."""
+        """Do one part of the repairs; returns the success."""
         try:
             await work()
         except HopError as error:
             failure = error
         except (AttributeError, KeyError, TypeError, ValueError):
-            # The shape of a neighbour's JSON is known only by use.
+            # A neighbour's JSON may have any shape, and only its use shows a wrong one.
             failure = HopError(hop, MEANINGLESS)
         else:
-            return self._tell(what, None)
+            return self._log_change(what, None)
         if what == "devices":
             self._health_monitor.agent_warning = failure.detail
             if isinstance(failure, NoAnswerError):
@@ -211,49 +191,53 @@ class Provisioner:
         elif what == "subscriptions":
             self._health_monitor.notify_error = failure.detail
         ask = self._ask_agent if failure.hop == "iot_agent" else self._ask_orion
-        return await ask() and self._tell(what, failure)
+        # A neighbour that is down has been logged by its own question.
+        return await ask() and self._log_change(what, failure)
 
     async def _check_devices(self) -> None:
         self._devices_at = clock.now().mono + _DEVICES_PERIOD_S
-        done = await provision(self._agent, self._orion, self._site)
-        _explain(done.mended)
-        # What only a person can mend stands on the health page while it lasts.
-        self._health_monitor.agent_warning = _in_short(done.problems)
+        result = await provision(self._agent, self._orion, self._site)
+        for sentence in result.mended:
+            _log.info("%s", sentence)
+        # Problems that only a person can solve stay on the health page.
+        self._health_monitor.agent_warning = _summary(result.problems)
 
     async def _check_subscriptions(self) -> None:
-        site, monitor = self._site, self._health_monitor
-        self._is_subscribing = True
+        site, monitor, own = self._site, self._health_monitor, self.subscriptions
+        own.is_changing = True
         try:
-            done = await ensure_subscriptions(
+            result = await ensure_subscriptions(
                 self._orion,
                 site.notify_url,
                 site.notify_token,
                 wanted_for(site.tiles, site.scanned),
             )
         finally:
-            self._is_subscribing = False
-        # What is made at the start was never missed.
-        missed = _in_short(done.mended) if self.subscription_ids else ""
-        self.subscription_ids = done.ids
-        self._former_secrets |= done.former_secrets
-        _explain(done.mended)
-        monitor.notify_detail, monitor.notify_error = done.failing, missed
-        if missed:
-            raise HopError("notifications", missed)
+            own.is_changing = False
+        # Subscriptions made at the start were not missing before.
+        repairs = _summary(result.mended) if own.ids else ""
+        own.ids = result.ids
+        own.former_secrets |= result.former_secrets
+        for sentence in result.mended:
+            _log.info("%s", sentence)
+        monitor.notify_detail, monitor.notify_error = result.failing, repairs
+        if repairs:
+            raise HopError("notifications", repairs)
 
     async def _read_robots(self) -> None:
-        """Read all robots, to restore what a gap has lost."""
+        """Read all robots, to restore data that a gap has lost."""
         entities = await self._orion.read_robots()
         at = clock.now()
         for entity in entities:
             for observation in codec.read_entity(entity).observations:
+                # The tenant may also hold robots that are not of this fleet.
                 if observation.robot_id in self._site.robots:
                     self._ingest.enqueue(
-                        Received(observation, at, FIWARE.id, asked=True)
+                        Received(observation, at, FIWARE.id, is_query_answer=True)
                     )
 
-    def _tell(self, what: str, error: HopError | None) -> bool:
-        """Log a loss once and a return once; says whether all is well."""
+    def _log_change(self, what: str, error: HopError | None) -> bool:
+        """Log a loss once and a repair once; returns whether there is no error."""
         if error is not None and what not in self._broken:
             self._broken.add(what)
             _log.warning("%s differs from the wanted state: %s", what, error)
@@ -268,7 +252,7 @@ async def _repeat(
     period_s: float,
     gap: asyncio.Event | None = None,
 ) -> None:
-    """For ever: sooner after a gap, ever later while it does not succeed."""
+    """Repeat work for ever: at once after a gap, ever later while it fails."""
     pause = _FIRST_PAUSE_S
     while True:
         if await work():
@@ -281,16 +265,12 @@ async def _repeat(
                 await (gap or asyncio.Event()).wait()
 
 
-def _explain(mended: Sequence[str]) -> None:
-    for sentence in mended:
-        _log.info("%s", sentence)
-
-
-def _in_short(sentences: Sequence[str]) -> str:
-    more = f" And {len(sentences) - 1} more." if len(sentences) > 1 else ""
-    return sentences[0] + more if sentences else ""
+def _summary(sentences: Sequence[str]) -> str:
+    """The first sentence, and the number of further sentences; empty for none."""
+    suffix = f" And {len(sentences) - 1} more." if len(sentences) > 1 else ""
+    return sentences[0] + suffix if sentences else ""
 
 
 def _slow(spent_s: float) -> str:
-    """Problem that a response time shows (s); empty for none."""
+    """Warning about a long response time (s); empty for a short one."""
     return f"answers take {spent_s:.1f} s" if spent_s > SLOW_S else ""

@@ -1,9 +1,9 @@
 """The rule's versions, in a small file of JSON lines.
 
-The settings make the first version.  A person's change outlives a restart, until the
-settings themselves change: then these are newer, and a version of their own.  A file
-with a line that cannot be read is put aside, and the strictest rule of what is left of
-it is in force until a person makes another.
+The settings make the first version.  A person's change outlives a restart.  When the
+settings themselves change, they make a newer version.  A file with an unreadable line
+is put aside.  Then the strictest rule of the readable lines is in force until a person
+makes another.
 """
 
 import asyncio
@@ -11,12 +11,13 @@ import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from iveg.adapters.files import (
     Form,
+    disk_errors,
     put_aside,
     read_lines,
     write_lines,
@@ -27,10 +28,10 @@ from iveg.domain.detection_rule import (
     DetectionRule,
     strictest,
 )
-from iveg.domain.errors import HopError
 from iveg.domain.observations import Instant
 from iveg.domain.parameters import PARAMETERS, Class, by_names
 from iveg.domain.stamps import format_stamp
+from iveg.models.base import with_fields
 from iveg.models.rule import parameter_fields
 from iveg.ngsi.codec.fields import first_complaint
 
@@ -48,11 +49,11 @@ class FileRules:
         self._versions: list[DetectionRule] = []
 
     def load(self, settings: DetectionRule, now: Instant) -> Sequence[DetectionRule]:
-        """All versions, oldest first; the last is to be in force.
+        """All versions, oldest first; the last is in force.
 
         Args:
-            settings: The rule as the settings have it.
-            now: When settings that differ from those of last time began to count.
+            settings: The rule of the settings.
+            now: Time from which changed settings count.
 
         Raises:
             DataFileError: the file is something else, or of a newer iVeg.
@@ -71,6 +72,7 @@ class FileRules:
         self, versions: list[DetectionRule], damage: str, now: Instant
     ) -> None:
         """Put the file aside and begin another with these versions."""
+        # In force even where the disk refuses the new file.
         self._versions = versions
         stamp = format_stamp(now.wall).replace(":", "")
         if put_aside(self._path, damage, f"damaged-{stamp}"):
@@ -80,18 +82,16 @@ class FileRules:
                 _log.error("%s could not be written: %s", self._path, error)
 
     async def append(self, rule: DetectionRule) -> None:
-        """Write a version down; returns when it is on disk.
+        """Write a version; returns when it is on disk.
 
         Raises:
             HopError: the disk did not take it.
         """
-        try:
+        with disk_errors():
             await asyncio.to_thread(self._write, [*self._versions, rule])
-        except OSError as error:
-            raise HopError("disk", str(error)) from error
 
     def _read(self) -> tuple[list[DetectionRule], str]:
-        """The versions that can be read, and where and why one of them cannot."""
+        """Readable versions, and the first unreadable line with its reason."""
         rules, damage = [], ""
         for number, line in read_lines(self._path, FORM):
             try:
@@ -108,38 +108,32 @@ class FileRules:
 def _with_settings(
     versions: list[DetectionRule], settings: DetectionRule, wall: float
 ) -> list[DetectionRule]:
-    """The versions, and one more where a setting is another than last time.
+    """The versions, and one more where a setting has changed since the last start.
 
-    Of that one only what the settings changed is new: the rest is as people left it.
+    That version changes those settings alone; people's other choices stay.
     """
     last, before = versions[-1], _as_set(versions)
     now = {row.name: getattr(settings, row.name) for row in PARAMETERS}
     new = {name: value for name, value in now.items() if before.get(name) != value}
     if replace(last, **new) == last:
         return versions
-    return [*versions, _next(last, _SETTINGS, wall, **new)]
-
-
-def _next(
-    last: DetectionRule, author: str, wall: float, **changes: Any
-) -> DetectionRule:
-    """The version after another; it came of no trial."""
-    changes |= {"comparison": None, "author": author, "since": wall}
-    return replace(last, version=last.version + 1, **changes)
+    # No trial led to this version.
+    new |= {"comparison": None, "author": _SETTINGS, "since": wall}
+    return [*versions, replace(last, version=last.version + 1, **new)]
 
 
 def _as_set(versions: list[DetectionRule]) -> dict[str, Any]:
-    """The parameters as the settings had them last: each where they changed it last."""
-    found = dict[str, Any]()
+    """Parameters of the settings: each from its last change by the settings."""
+    values = dict[str, Any]()
     for before, rule in zip([None, *versions], versions, strict=False):
         if rule.author != _SETTINGS:
             continue
         for row in PARAMETERS:
             value = getattr(rule, row.name)
             is_new = before is None or getattr(before, row.name) != value
-            if is_new or row.name not in found:
-                found[row.name] = value
-    return found
+            if is_new or row.name not in values:
+                values[row.name] = value
+    return values
 
 
 class _StoredRule(BaseModel):
@@ -162,22 +156,15 @@ class _StoredRule(BaseModel):
             row.name: row.read(stored, row.default, row.name) for row in PARAMETERS
         }
         values |= {name: stored[name] for name in _StoredRule.model_fields}
-        # Looks always add up, also in versions of before that was so.
+        # Looks always add up now, also for a version stored when they did not.
         values["possible_people"] = True
         return DetectionRule(**values)
 
 
-if TYPE_CHECKING:
-    StoredRule = _StoredRule
-else:
-    StoredRule = create_model(
-        "StoredRule",
-        __base__=_StoredRule,
-        **parameter_fields(lambda row: row.name, "default"),
-    )
+StoredRule = with_fields(parameter_fields(lambda row: row.name, "default"))(_StoredRule)
 
 
 def rule_fields(rule: DetectionRule) -> dict[str, object]:
     """The line of a version."""
-    own = {name: getattr(rule, name) for name in _StoredRule.model_fields}
-    return {**by_names(rule), **own, "aliases": dict(rule.aliases)}
+    fields = {name: getattr(rule, name) for name in _StoredRule.model_fields}
+    return {**by_names(rule), **fields, "aliases": dict(rule.aliases)}

@@ -1,12 +1,12 @@
 """TOML files of a checked shape; a complaint names file, key and reason."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from iveg.domain.errors import DataFileError
 
@@ -15,7 +15,7 @@ KeyPath = tuple[str | int, ...]
 
 
 class Table(BaseModel):
-    """A table of a file; a number may be written without a point, a text is none."""
+    """Table of a file; an integer may stand for a number, a text may not."""
 
     model_config = ConfigDict(
         strict=True, extra="forbid", allow_inf_nan=False, frozen=True
@@ -25,12 +25,23 @@ class Table(BaseModel):
 T = TypeVar("T", bound=Table)
 
 
+def must(holds: Callable[[str], bool], complaint: str) -> AfterValidator:
+    """Refuse a text that fails a condition; ``{}`` in the complaint is the text."""
+
+    def checked(text: str) -> str:
+        if not holds(text):
+            raise ValueError(complaint.format(text))
+        return text
+
+    return AfterValidator(checked)
+
+
 def read_text(file: str, own: Mapping[str, str] | None = None) -> str:
     """The text of a file.
 
     Args:
-        file: Its path, or the name of one of iVeg's own.
-        own: Those, by name: their place in ``iveg/data``.
+        file: Its path, or the name of a built-in file.
+        own: Built-in files by name, with their paths in ``iveg/data``.
 
     Raises:
         DataFileError: it cannot be read.
@@ -57,13 +68,14 @@ def read_table(text: str, file: str, shape: type[T]) -> T:
         raise DataFileError(file, "", f"is not TOML: {error}.") from error
     except ValidationError as error:
         complaints = error.errors(include_input=False, include_url=False)
-        # A key that was mistyped says more than that the right one is missing.
-        first = min(complaints, key=lambda one: one["type"] != "extra_forbidden")
+        # A mistyped key explains more than the complaint that the right one is missing.
+        first = min(complaints, key=lambda item: item["type"] != "extra_forbidden")
         raise complaint(file, first["loc"], first["msg"]) from error
 
 
 def complaint(file: str, path: KeyPath, reason: str) -> DataFileError:
-    """The error that one key of a file is wrong."""
+    """Error for a wrong key of a file."""
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
-    said = reason.removeprefix("Value error, ")
-    return DataFileError(file, key.lstrip("."), f"{said}.")
+    # pydantic puts these words before the text of a validator of ours.
+    text = reason.removeprefix("Value error, ")
+    return DataFileError(file, key.lstrip("."), f"{text}.")

@@ -1,6 +1,6 @@
 """Transports of orders: straight over MQTT, and through Orion and the IoT Agent.
 
-They share nothing, so that a fault of one leaves the other alone.
+They share nothing, so that a fault of one transport leaves the other alone.
 """
 
 from abc import ABC, abstractmethod
@@ -16,7 +16,7 @@ from iveg.ngsi import codec, names
 
 
 class _OrderTransport(ABC):
-    """Orders as commands of NGSI; implements ``vital.ports.CommandPort``."""
+    """Orders as NGSI commands; implements ``vital.ports.CommandPort``."""
 
     @abstractmethod
     async def _order(
@@ -25,7 +25,7 @@ class _OrderTransport(ABC):
         """Send a command once."""
 
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
-        """Send a STOP, which may be sent again."""
+        """Send a STOP; a repetition does no harm."""
         await self._order(robot_id, codec.write_stop(hold_id, by))
 
     async def release(
@@ -44,24 +44,24 @@ class _OrderTransport(ABC):
 
 
 class MqttTransport(_OrderTransport):
-    """Straight to the robots; implements ``vital.ports.FleetPort``, too."""
+    """Orders straight to the robots; also implements ``vital.ports.FleetPort``."""
 
     def __init__(self, link: MqttLink, apikey: str) -> None:
-        self._link = link
-        self._apikey = apikey
+        self._link, self._apikey = link, apikey
 
     def publish_feedback(self, feedback: Feedback) -> None:
-        """Offer feedback; a newer one overtakes what has not left yet."""
+        """Offer feedback; newer feedback replaces feedback that has not left yet."""
         topic = names.FEEDBACK_TOPIC.format(robot_id=feedback.robot_id)
         self._link.enqueue(topic, codec.write_feedback(feedback), qos=1)
 
     def publish_peer_scan(self, scan: PeerScan) -> None:
-        """Offer a scan at QoS 0; a newer one overtakes what has not left yet."""
+        """Offer a scan at QoS 0; a newer scan replaces one that has not left yet."""
         topic = names.PEER_SCAN_TOPIC.format(robot_id=scan.robot_id)
         self._link.enqueue(topic, codec.write_peer_scan(scan))
 
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
-        """Publish a STOP, never retained; returns when the broker has it."""
+        """Publish a STOP, never retained; returns when the broker has confirmed."""
+        # QoS 1: unlike a release, a copy that arrives late makes nothing drive.
         await self._order(robot_id, codec.write_stop(hold_id, by), qos=1)
 
     async def _order(
@@ -71,7 +71,7 @@ class MqttTransport(_OrderTransport):
         name: str = names.COMMAND,
         qos: int = 0,
     ) -> None:
-        """Publish; at QoS 0 no client sends it again after a lost connection."""
+        """Publish; at QoS 0 no client repeats an order after a lost connection."""
         topic = names.command_topic(self._apikey, robot_id)
         await self._link.publish(topic, codec.write_command(value, name), qos=qos)
 
@@ -85,7 +85,7 @@ class MqttTransport(_OrderTransport):
 
 
 class OrionTransport(_OrderTransport):
-    """Through Orion, whose 204 is no evidence."""
+    """Orders through Orion; its 204 is no evidence of arrival."""
 
     def __init__(self, orion: OrionClient) -> None:
         self._orion = orion

@@ -1,8 +1,8 @@
 """One process beside the server, for work that would hold up its loop.
 
-Sheets, charts and exports take seconds of CPU, and a thread would still fight the loop
-for the interpreter.  The process begins with the first question, ends with the server,
-and is made anew where it died or took too long.  Questions wait in one short line.
+Sheets, charts and exports take seconds of CPU, and a thread would still compete with
+the loop for the interpreter.  The process begins with the first call, ends with the
+server, and is replaced where it died or took too long.  Calls wait in a short queue.
 """
 
 import asyncio
@@ -20,20 +20,20 @@ from iveg.adapters.files import give_way
 from iveg.domain.errors import HopError
 
 MOST_WAITING = 16
-"""Questions that wait or are worked on; one more is refused."""
+"""Calls that wait or run; another is refused."""
 LIMIT_S, PACK_LIMIT_S = 60.0, 240.0
-"""Time that one may take; a pack has its pages printed by a browser."""
+"""Time limit of a call (s); a browser prints the pages of an incident pack."""
 _NAME = "worker"
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 
 
 class Worker:
-    """Runs functions of modules, with values that can be pickled.
+    """Runs functions of modules, with arguments that can be pickled.
 
     Args:
-        failed: Told that the process failed; called in the loop.
-        limit_s: Time that one call may take; then the process is killed.
+        failed: Called in the loop with the error of a failed process.
+        limit_s: Time limit of a call (s); then the process is killed.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class Worker:
     ) -> None:
         self._failed = failed
         self._limit_s = limit_s
-        # A thread waits for the process, and pickles values.
+        # The thread pickles values and waits for the process; the loop does neither.
         self._thread = ThreadPoolExecutor(1, _NAME)
         self._process: SpawnProcess | None = None
         self._line: Connection | None = None
@@ -55,17 +55,15 @@ class Worker:
         """Run ``work`` in the other process, and return its result.
 
         Raises:
-            HopError: it raised one, the process died or took too long, or too many
-                wait already.
+            HopError: ``work`` raised it, the process died or took too long, or too many
+                calls wait already.
         """
         if self._waiting >= MOST_WAITING:
             raise HopError(_NAME, "too much is asked at once")
         self._waiting += 1
         try:
-            loop = asyncio.get_running_loop()
-            return await loop.run_in_executor(
-                self._thread, self._ask, work, args, kwargs
-            )
+            future = self._thread.submit(self._ask, work, args, kwargs)
+            return await asyncio.wrap_future(future)
         except HopError as error:
             if error.hop == _NAME and self._failed is not None:
                 self._failed(error)
@@ -74,7 +72,7 @@ class Worker:
             self._waiting -= 1
 
     def close(self) -> None:
-        """End the process, whatever it does."""
+        """Kill the process, also in the middle of a call."""
         self._thread.shutdown(wait=False, cancel_futures=True)
         self._end()
 
@@ -103,22 +101,22 @@ class Worker:
         return result
 
     def _begin(self) -> Connection:
-        # Spawned: a copy of this process would have its threads' locks, for ever.
+        # Spawned: a fork would copy locks that threads hold, and nobody frees them.
         context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
+        server_end, process_end = context.Pipe()
         process = context.Process(
-            target=_serve, args=(theirs,), name="iveg-worker", daemon=True
+            target=_serve, args=(process_end,), name="iveg-worker", daemon=True
         )
         process.start()
-        # The process has its own: ours open would hide that it has died.
-        theirs.close()
-        self._line, self._process = ours, process
-        return ours
+        # The process has its own end: a copy open here would hide its death.
+        process_end.close()
+        self._line, self._process = server_end, process
+        return server_end
 
     def _end(self) -> None:
         line, self._line = self._line, None
         process, self._process = self._process, None
-        # A process whose line is closed would say so in the log before it dies.
+        # Killed first: a process whose line is closed would log that before it ends.
         if process is not None:
             process.kill()
             process.join()
@@ -127,7 +125,7 @@ class Worker:
 
 
 def _serve(line: Connection) -> None:
-    """Answer until the server is gone; Ctrl-C is the server's to heed."""
+    """Answer calls until the server is gone; the server handles Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     give_way()
     with suppress(EOFError):
@@ -140,7 +138,7 @@ def _answer(
     args: Sequence[object],
     kwargs: Mapping[str, object],
 ) -> bytes:
-    """Result, hop that failed and its detail, pickled."""
+    """Run a call; returns result, failed hop and detail, pickled."""
     try:
         return pickle.dumps((work(*args, **kwargs), "", ""))
     except HopError as error:

@@ -1,9 +1,9 @@
-"""Command line: arguments and settings to parts (docs/interfaces/cli.md)."""
+"""Command line: arguments and settings → parts (docs/interfaces/cli.md)."""
 
 import logging
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -30,46 +30,36 @@ from iveg.settings import GONE, Settings, default_data_directory
 _log = logging.getLogger(__name__)
 UNUSABLE = 2
 """Exit code for a setting or a file that cannot be used."""
+_UNUSABLE_ERRORS = SettingsError, DataFileError, MissingExtraError
 
 
 def main(arguments: Sequence[str]) -> int:
     """Run one command; returns the exit code."""
-    options = parser(_commands()).parse_args(arguments)
+    # Commands of the product, and of the laboratory where it is installed.
+    laboratory = find_laboratory("commands")
+    commands = COMMANDS if laboratory is None else (*COMMANDS, *laboratory.COMMANDS)
+    options = parser(commands).parse_args(arguments)
     logging.basicConfig(
         level=logging.INFO if options.verbose else logging.WARNING,
         format="%(asctime)s %(levelname)s %(name)s: %(message)s",
     )
-    # They log every message at INFO; important events are warnings.
-    for noisy in ("httpx", "alembic"):
+    # These log every request at INFO; their important events are warnings.
+    for noisy in ("httpx", "httpx2", "alembic"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
     try:
         settings = Settings.from_environment(os.environ)
-        _warn_of_gone(os.environ)
+        if old_names := sorted(name for name in GONE if os.environ.get(name)):
+            text = "%s: no longer a setting (docs/upgrading.md)"
+            _log.warning(text, ", ".join(old_names))
         data = settings.data_directory or default_data_directory(
             os.environ, Path.home()
         )
         call = CommandCall(options, settings, os.environ, Path(data))
         code: int = import_module(options.module).run(call)
-    except (SettingsError, DataFileError, MissingExtraError) as error:
-        print(f"iveg: {error}", file=sys.stderr)
-        return UNUSABLE
     except IvegError as error:
         print(f"iveg: {error}", file=sys.stderr)
-        return 1
+        return UNUSABLE if isinstance(error, _UNUSABLE_ERRORS) else 1
     return code
-
-
-def _warn_of_gone(environment: Mapping[str, str]) -> None:
-    """Name settings that no version has any more, in one warning."""
-    gone = sorted(name for name in GONE if environment.get(name))
-    if gone:
-        _log.warning("%s: no longer a setting (docs/upgrading.md)", ", ".join(gone))
-
-
-def _commands() -> Sequence[CommandWord]:
-    """Commands of the product, and of the laboratory where it is installed."""
-    laboratory = find_laboratory("commands")
-    return COMMANDS if laboratory is None else (*COMMANDS, *laboratory.COMMANDS)
 
 
 COMMANDS = (
@@ -92,7 +82,7 @@ COMMANDS = (
 def find_laboratory(part: str) -> ModuleType | None:
     """A module of the laboratory by its name; None where there is no laboratory.
 
-    The one door: nothing of the product imports ``iveg.lab``, which an image lacks.
+    The only import of ``iveg.lab`` by the product: the server's image lacks it.
     """
     module = f"iveg.lab.{part}"
     try:

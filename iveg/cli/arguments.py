@@ -15,12 +15,12 @@ AddArguments = Callable[[argparse.ArgumentParser], None]
 
 @dataclass(frozen=True, slots=True)
 class CommandCall:
-    """One call of the command line.
+    """Call of the command line.
 
     Attributes:
-        options: Its arguments.
+        options: Parsed arguments.
         environment: Variables of the process, from which the settings were read.
-        data: Directory of iVeg's data.
+        data: Data directory.
     """
 
     options: argparse.Namespace
@@ -31,12 +31,12 @@ class CommandCall:
 
 @dataclass(frozen=True, slots=True)
 class CommandWord:
-    """One word of the command line.
+    """Command of the command line.
 
     Attributes:
         help: Its line in ``iveg --help``.
-        module: Its ``run`` executes a call and returns the exit code.  It is imported
-            then: a robot starts without the libraries of page and history.
+        module: Module whose ``run`` executes a call and returns the exit code.  A call
+            imports it: a robot starts without the libraries of page and history.
         add_arguments: Adds its arguments to its parser.
     """
 
@@ -47,7 +47,7 @@ class CommandWord:
 
 
 def parser(commands: Iterable[CommandWord]) -> argparse.ArgumentParser:
-    """The parser of these commands, in the order of ``iveg --help``."""
+    """Parser of these commands, in the order of ``iveg --help``."""
     parser = argparse.ArgumentParser(
         prog="iveg", description="Supervise mixed robot fleets in greenhouses."
     )
@@ -90,12 +90,12 @@ def add_user(user: argparse.ArgumentParser) -> None:
     """Arguments of ``iveg user``."""
     actions = user.add_subparsers(dest="action", required=True)
     actions.add_parser("list", help="names, roles and states")
-    for action, says in {
+    for action, text in {
         "add": "a person, with a link that works once",
         "reset": "take the password away, and print a new link",
         "disable": "sign them out everywhere, for good",
     }.items():
-        words = actions.add_parser(action, help=says)
+        words = actions.add_parser(action, help=text)
         words.add_argument("name", metavar="NAME")
         if action == "add":
             roles = ("viewer", "operator", "admin")
@@ -117,8 +117,8 @@ def add_replay(replay: argparse.ArgumentParser) -> None:
     )
     replay.add_argument("--speed", type=_speed, default=1.0, metavar="FACTOR")
     replay.add_argument("--loop", action="store_true", help="start over at the end")
-    for what in ("odom", "scan", "detections"):
-        replay.add_argument(f"--{what}-topic", metavar="TOPIC", help="of a ROS bag")
+    for data in ("odom", "scan", "detections"):
+        replay.add_argument(f"--{data}-topic", metavar="TOPIC", help="of a ROS bag")
     replay.add_argument(
         "--frame",
         type=_frame,
@@ -169,7 +169,7 @@ def add_network(parser: argparse.ArgumentParser) -> None:
 
 
 def add_end(parser: argparse.ArgumentParser) -> None:
-    """For a part that its parent ends."""
+    """Option of a part that ends with its parent process."""
     parser.add_argument(
         "--until-eof", action="store_true", help="end when the input closes"
     )

@@ -16,9 +16,9 @@ from iveg.adapters import clock
 from iveg.adapters.database_check import check_database
 from iveg.adapters.fiware_http import FiwareHttp
 from iveg.adapters.history.engine import history_url
-from iveg.adapters.mqtt import publish_and_hear
-from iveg.adapters.reconciler import PREFIX, describe_failures, provision
-from iveg.app.outside import open_fiware, site_of
+from iveg.adapters.mqtt import publish_and_receive
+from iveg.adapters.reconciler import describe_failures, own_subscriptions, provision
+from iveg.app import open_fiware, site_of
 from iveg.cli.arguments import CommandCall
 from iveg.cli.nodes import broker_of
 from iveg.cli.running import page_address, run_until_stopped
@@ -35,7 +35,7 @@ _NEEDS: Mapping[Hop, tuple[Hop, ...]] = {
     Hop.AGENT: (Hop.MQTT, Hop.ORION),
     Hop.NOTIFICATIONS: (Hop.ORION, Hop.PAGE),
 }
-"""Hops without which another is not tried."""
+"""Hop → hops that must work before it is tested."""
 _ADVICE: Mapping[Hop, str] = {
     Hop.MQTT: "look whether the broker runs, at its access list and password file, and "
     "at IVEG_MQTT_URL, IVEG_MQTT_USER and IVEG_MQTT_PASSWORD",
@@ -53,7 +53,7 @@ _ADVICE: Mapping[Hop, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Result of one tested hop; ``said`` is a reason, or a remark about a good one."""
+    """Result of a tested hop; ``said`` is the reason of a failure, or a remark."""
 
     is_ok: bool
     said: str = ""
@@ -64,7 +64,7 @@ _Step = Callable[[], Awaitable[object]]
 
 
 def run(call: CommandCall) -> int:
-    """Examine and print a line for each hop; returns the exit code."""
+    """Test all hops and print a line for each; returns the exit code."""
     findings: Findings = {}
     run_until_stopped(examine(call.settings, call.data, findings))
     for hop in Hop:
@@ -73,14 +73,14 @@ def run(call: CommandCall) -> int:
 
 
 def write_line(hop: Hop, findings: Findings) -> str:
-    """Hop, verdict and one sentence of what to do."""
-    found = findings.get(hop)
-    if found is None:
+    """Line of a hop: name, verdict and advice in one sentence."""
+    finding = findings.get(hop)
+    if finding is None:
         verdict, sentence = "not tried", "repair the failed hops first"
-    elif found.is_ok:
-        verdict, sentence = "ok", found.said
+    elif finding.is_ok:
+        verdict, sentence = "ok", finding.said
     else:
-        verdict, sentence = "failed", f"{found.said}; {_ADVICE[hop]}"
+        verdict, sentence = "failed", f"{finding.said}; {_ADVICE[hop]}"
     return f"{hop:<13}  {verdict:<9}  {sentence}".rstrip()
 
 
@@ -92,11 +92,12 @@ async def examine(
     Args:
         settings: Addresses of the parts.
         data: Directory of the history unless the settings name another.
-        findings: Filled hop by hop; the ones that depend on a failed one stay out.
+        findings: Filled hop by hop; hops that need a failed hop are left out.
         patience_s: Time limit of each hop (s).
     """
     database = history_url(settings.database_url, data)
-    async with _Path(settings) as path:
+    path = _Path(settings)
+    async with path.orion, path.agent, path.page:
         steps: tuple[tuple[Hop, _Step], ...] = (
             (Hop.MQTT, path.publish_probe),
             (Hop.ORION, path.orion.version),
@@ -114,8 +115,8 @@ async def examine(
 async def _try(step: _Step, patience_s: float) -> Finding:
     try:
         async with asyncio.timeout(patience_s):
-            found = await step()
-            return found if isinstance(found, Finding) else Finding(True)
+            result = await step()
+            return result if isinstance(result, Finding) else Finding(True)
     except TimeoutError:
         return Finding(False, f"nothing came in {patience_s:g} s")
     except HopError as error:
@@ -129,32 +130,25 @@ class _Page(FiwareHttp):
 
 
 class _Path:
-    """Uses of the hops of the data path; each raises HopError where it fails."""
+    """Tests of hops of the data path; each raises HopError where it fails."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self.orion, self._agent = open_fiware(settings)
+        self.orion, self.agent = open_fiware(settings)
         self.page = _Page(page_address(settings), "", "")
 
-    async def __aenter__(self) -> "_Path":
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        for client in (self.orion, self._agent, self.page):
-            await client.close()
-
     async def publish_probe(self) -> str:
-        """Publish a probe and hear it from the broker; returns its stamp."""
+        """Publish a probe and receive it from the broker; returns its stamp."""
         stamp = codec.format_stamp(clock.wall())
         payload = codec.write_heartbeat(Origin(secrets.token_hex(4), 1, stamp))
         topic = names.measure_topic(self._settings.apikey, names.HEARTBEAT_ID)
-        await publish_and_hear(broker_of(self._settings), topic, payload)
+        await publish_and_receive(broker_of(self._settings), topic, payload)
         return stamp
 
     async def send_measure(self) -> Finding:
         """Repair the devices, then send a probe and wait until Orion has it."""
-        await self._agent.version()
-        await provision(self._agent, self.orion, site_of(self._settings))
+        await self.agent.version()
+        await provision(self.agent, self.orion, site_of(self._settings))
         began, stamp = clock.mono(), await self.publish_probe()
         # Orion is polled: notifications are tested by another hop.
         while not await self._has_probe(stamp):  # noqa: ASYNC110
@@ -166,17 +160,13 @@ class _Path:
         """Whether Orion has this probe, or a later one of a running iVeg."""
         read = codec.read_entity(await self.orion.read_probe() or {})
         return any(
-            isinstance(found, HeartbeatProbe) and (found.origin.stamp or "") >= stamp
-            for found in read.observations
+            isinstance(probe, HeartbeatProbe) and (probe.origin.stamp or "") >= stamp
+            for probe in read.observations
         )
 
     async def look_at_subscriptions(self) -> None:
-        """Read at Orion whether iVeg's subscriptions are there and deliver."""
-        ours = [
-            subscription
-            for subscription in await self.orion.read_subscriptions()
-            if str(subscription.get("description", "")).startswith(PREFIX)
-        ]
+        """Check at Orion that iVeg's subscriptions exist and deliver."""
+        ours = await own_subscriptions(self.orion)
         if failing := describe_failures(ours):
             raise HopError(Hop.NOTIFICATIONS, failing)
         if not ours:

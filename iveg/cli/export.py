@@ -1,4 +1,4 @@
-"""``iveg export``: a list of the history as a file, whatever its length."""
+"""``iveg export``: writes a list of the history to a file, page by page."""
 
 import argparse
 import asyncio
@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from iveg.adapters.database_check import check_database
+from iveg.adapters.files import disk_errors
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.lists import MOST_ROWS, Filter
 from iveg.adapters.history.queries import Queries
@@ -22,7 +23,7 @@ def run(call: CommandCall) -> int:
     """Write the file; returns the exit code.
 
     Raises:
-        IvegError: it cannot be done.  Then there is no file.
+        IvegError: it cannot be done.  Then no file is written.
     """
     options = call.options
     url = history_url(call.settings.database_url, call.data)
@@ -30,37 +31,37 @@ def run(call: CommandCall) -> int:
     until = _moment("--until", options.until)
     if since is not None and until is not None and since > until:
         raise SettingsError("--since", options.since, "a moment before --until")
-    wanted = Filter(since=since, until=until, robot=options.robot, limit=MOST_ROWS)
+    filters = Filter(since=since, until=until, robot=options.robot, limit=MOST_ROWS)
     check_database(url)
-    try:
-        with contextlib.closing(Queries(url)) as queries, _opened(options.out) as file:
-            asyncio.run(_export(options, queries, wanted, file))
-    except OSError as error:
-        hop = "output" if options.out is None else "disk"
-        raise HopError(hop, error.strerror or str(error)) from error
+    with (
+        disk_errors("output" if options.out is None else "disk"),
+        contextlib.closing(Queries(url)) as queries,
+        _opened(options.out) as file,
+    ):
+        asyncio.run(_export(options, queries, filters, file))
     return 0
 
 
 def _moment(option: str, text: str | None) -> float | None:
     if text is None:
         return None
-    found = parse_stamp(text)
-    if found is None:
-        wanted = "a moment as ISO-8601, in UTC unless it says otherwise"
-        raise SettingsError(option, text, wanted)
-    return found
+    moment = parse_stamp(text)
+    if moment is None:
+        form = "a moment as ISO-8601, in UTC unless it says otherwise"
+        raise SettingsError(option, text, form)
+    return moment
 
 
 @contextlib.contextmanager
 def _opened(out: Path | None) -> Iterator[BinaryIO]:
-    """The output, or a file that takes its place once it is whole."""
+    """Standard output, or a file that gets its name once it is whole."""
     if out is None:
-        # A buffer of its own: what a closed pipe left in it fails here, not at exit.
+        # A buffer of its own: a closed pipe fails here, and not at the exit of Python.
         with open(sys.stdout.fileno(), "wb", closefd=False) as file:
             yield file
         return
     if out.exists() and not out.is_file():
-        # Whatever writes to it would find a file in its place.
+        # Replacing a pipe or a device would take it from the programs that use it.
         raise HopError("disk", f"{out} is there and no file")
     part = out.with_name(out.name + ".part")
     try:
@@ -74,8 +75,7 @@ def _opened(out: Path | None) -> Iterator[BinaryIO]:
 async def _export(
     options: argparse.Namespace, queries: Queries, wanted: Filter, file: BinaryIO
 ) -> None:
-    (one,) = (one for one in lists_of(queries) if one.path == options.list)
-    first = await queries.page(one.source, wanted)
-    pages = queries.pages(one.source, first, wanted)
-    async for part in file_parts(one, pages, options.format, asyncio.to_thread):
+    (row,) = (row for row in lists_of(queries) if row.path == options.list)
+    pages = queries.pages(row.source, await queries.page(row.source, wanted), wanted)
+    async for part in file_parts(row, pages, options.format, asyncio.to_thread):
         file.write(part)

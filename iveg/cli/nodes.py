@@ -1,4 +1,4 @@
-"""Settings of the safety nodes that a part runs: broker, robot's file and network."""
+"""Settings of safety nodes that a command runs: broker, configuration and network."""
 
 import argparse
 import logging
@@ -12,6 +12,7 @@ from iveg.adapters.mqtt import BrokerAddress, TlsFiles
 from iveg.adapters.toml_files import read_text
 from iveg.domain.errors import SettingsError
 from iveg.domain.witness import Plan
+from iveg.robot.judgement import Limits
 from iveg.robot.node import NodeSettings
 from iveg.robot.ros2.config import RobotConfig, read_config
 from iveg.settings import Settings
@@ -22,18 +23,20 @@ _log = logging.getLogger(__name__)
 def node_settings(
     settings: Settings, directory: Path, plan: Plan | None = None
 ) -> NodeSettings:
-    """As an operator chose; hold files below ``directory``.
+    """Settings of a node, from an operator's; hold files are below ``directory``.
 
-    ``plan``: what stands in the greenhouse; None: nobody drew it.
+    ``plan``: fixed things in the greenhouse; None: unknown.
     """
     return NodeSettings(
         address=broker_of(settings),
         apikey=settings.apikey,
         directory=directory,
-        slow_s=settings.feedback_slow_s,
-        stand_s=settings.feedback_stand_s,
-        on_link_loss=settings.on_link_loss,
-        plan=plan,
+        limits=Limits(
+            slow_s=settings.feedback_slow_s,
+            stand_s=settings.feedback_stand_s,
+            on_link_loss=settings.on_link_loss,
+            plan=plan,
+        ),
     )
 
 
@@ -50,10 +53,10 @@ def broker_of(settings: Settings) -> BrokerAddress:
 def load_config(
     options: argparse.Namespace, environment: Mapping[str, str]
 ) -> RobotConfig:
-    """Configuration of file and command line.
+    """Configuration of a robot, from its file and the command line.
 
     Raises:
-        DataFileError: a file or a word that cannot be used.
+        DataFileError: the file or an argument cannot be used.
     """
     config, file = RobotConfig(), getattr(options, "config", None)
     if file is not None:
@@ -61,6 +64,7 @@ def load_config(
     if config.detector.classes:
         _log.warning("%s: detector.classes is not read; the fleet file has them", file)
     domain = options.ros_domain
+    # The command line counts first, then the file, then the environment.
     if domain is None and "domain" not in config.ros.model_fields_set:
         domain = _domain_of(environment)
     ros = {
@@ -74,14 +78,14 @@ def load_config(
 
 
 def _domain_of(environment: Mapping[str, str]) -> int | None:
-    said = environment.get("ROS_DOMAIN_ID", "")
-    if said and not said.isdecimal():
-        raise SettingsError("ROS_DOMAIN_ID", said, "a whole number from 0 to 232")
-    return int(said) if said else None
+    text = environment.get("ROS_DOMAIN_ID", "")
+    if text and not text.isdecimal():
+        raise SettingsError("ROS_DOMAIN_ID", text, "a whole number from 0 to 232")
+    return int(text) if text else None
 
 
-def _without_none(said: Mapping[str, object]) -> dict[str, Any]:
-    return {key: value for key, value in said.items() if value is not None}
+def _without_none(values: Mapping[str, object]) -> dict[str, Any]:
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def network_of(

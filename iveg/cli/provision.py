@@ -1,9 +1,9 @@
-"""``iveg provision``: what FIWARE must know of the fleet, made or mended once."""
+"""``iveg provision``: makes or repairs the fleet's devices in FIWARE, once."""
 
 import asyncio
 
 from iveg.adapters.reconciler import provision
-from iveg.app.outside import open_fiware, site_of
+from iveg.app import open_fiware, site_of
 from iveg.cli.arguments import CommandCall
 
 
@@ -13,9 +13,9 @@ def run(call: CommandCall) -> int:
     async def work() -> None:
         orion, agent = open_fiware(call.settings)
         async with orion, agent:
-            done = await provision(agent, orion, site_of(call.settings))
-        said = [*done.mended, *done.problems]
-        print("\n".join(said) or "Everything was as it should be.")
+            result = await provision(agent, orion, site_of(call.settings))
+        sentences = [*result.mended, *result.problems]
+        print("\n".join(sentences) or "Everything was as it should be.")
 
     asyncio.run(work())
     return 0

@@ -1,4 +1,4 @@
-"""``iveg replay``: recorded logs as robots, whose names no live robot may have."""
+"""``iveg replay``: plays recorded logs as robots, never under a live robot's name."""
 
 import argparse
 from pathlib import Path
@@ -21,7 +21,7 @@ def run(call: CommandCall) -> int:
 
 
 async def replay(options: argparse.Namespace, settings: Settings) -> None:
-    """Recorded logs of real robots, replayed as robots."""
+    """Play recorded logs of real robots as robots."""
     fleet = load_fleet(settings.fleet, settings.robots)
     _refuse_replay(options, settings, fleet)
     with TemporaryDirectory(prefix="iveg-replay-") as directory:
@@ -49,8 +49,7 @@ def _refuse_replay(
     """Refuse a replay that could be taken for a live robot."""
     for name in options.robot:
         if name not in fleet.members:
-            known = ", ".join(fleet.ids)
-            reason = f"is not in the fleet (IVEG_ROBOTS: {known})"
+            reason = f"is not in the fleet (IVEG_ROBOTS: {', '.join(fleet.ids)})"
             raise DataFileError("--robot", name, reason)
         if fleet.of_robot(name).kind == "live":
             reason = f"is a live robot of the fleet; {name}:recording in IVEG_ROBOTS"

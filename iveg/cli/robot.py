@@ -1,4 +1,4 @@
-"""``iveg robot`` connects a ROS 2 robot; ``iveg robot check`` reports what it lacks."""
+"""``iveg robot`` connects a ROS 2 robot; ``iveg robot check`` reports its problems."""
 
 import asyncio
 from collections import Counter
@@ -44,7 +44,7 @@ async def check(
     network: DdsNetwork,
     settings: Settings,
 ) -> int:
-    """Listen without publishing, and print what is wrong; 1 where anything is."""
+    """Listen without publishing, and print problems; returns 1 where there are any."""
     from iveg.adapters.dds import Dds
 
     counts, frames = Counter[str](), dict[str, str]()
@@ -56,10 +56,10 @@ async def check(
             subscriptions.meet(dds.endpoints())
             await asyncio.sleep(0.03)
             now = clock.now()
-            for topic, form, waited in subscriptions.take():
-                counts[topic] += len(waited)
-                frames[topic] = _frame(form, waited[-1])
-                inputs.hear(topic, waited, now.mono, form)
+            for topic, form, payloads in subscriptions.take():
+                counts[topic] += len(payloads)
+                frames[topic] = _frame(form, payloads[-1])
+                inputs.receive(topic, payloads, now.mono, form)
             inputs.tick(now)
         rows = judge(
             config,
@@ -78,7 +78,7 @@ async def check(
 
 
 def _frame(form: type[Message], payload: bytes) -> str:
-    """Frame of a message; empty where it has none, or cannot be read."""
+    """Frame of a message; empty where it has none or cannot be read."""
     try:
         header = getattr(cdr.read(form, payload), "header", None)
     except UnreadableError:
@@ -118,10 +118,11 @@ async def _ride(
     options, settings = call.options, call.settings
     plan = None
     if options.greenhouse is not None:
-        # What the laser need not report.
-        plan = Plan.of(load_greenhouse(options.greenhouse))
+        # The laser need not report what the plan shows.
+        plan = Plan.from_greenhouse(load_greenhouse(options.greenhouse))
     described = load_fleet(settings.fleet, settings.robots).of_robot(options.id)
     with Dds(network, gate=options.id) as dds:
+        # Before any endpoint of ours: two gates would both drive the base.
         await refuse_second_gate(dds, config.full_topics["cmd_vel_out"])
         robot = Ros2Robot(
             options.id,
@@ -158,7 +159,8 @@ async def refuse_second_gate(
         dds: The DDS network.
         topic: Topic of the drive.
         discovery_s: Time of discovery (s).
-        ghost_s: A gate that was killed is still announced for its lease of 3 s.
+        ghost_s: Time after which a publisher counts (s): a killed gate is still
+            announced for its lease of 3 s.
 
     Raises:
         HopError: another program publishes on the topic.
@@ -169,9 +171,9 @@ async def refuse_second_gate(
         end.writes and end.topic == topic and not end.own for end in dds.endpoints()
     ):
         if clock.mono() - began > ghost_s:
-            detail = (
+            raise HopError(
+                "dds",
                 f"{topic} has a publisher already: another gate, or a navigation that "
-                "goes round it; only one program may drive this robot"
+                "goes round it; only one program may drive this robot",
             )
-            raise HopError("dds", detail)
         await asyncio.sleep(0.1)

@@ -1,7 +1,7 @@
-"""Runs one part in the foreground until it is ended.
+"""Runs a part in the foreground until it is ended.
 
-Ctrl-C, SIGTERM and, where asked for, the end of the standard input all end a part the
-same way: it is cancelled, cleans up, and leaves with exit code 0.
+Ctrl-C, SIGTERM and, with ``--until-eof``, the end of the standard input end a part the
+same way: it is cancelled, cleans up, and exits with code 0.
 """
 
 import asyncio
@@ -12,7 +12,6 @@ import signal
 import socket
 import sys
 from collections.abc import Coroutine
-from typing import TextIO
 
 import segno
 import uvloop
@@ -50,41 +49,39 @@ def _read(loop: asyncio.AbstractEventLoop, task: asyncio.Task[None]) -> None:
 
 
 def sign_in_link(settings: Settings, token: str) -> str:
-    """Address that signs a browser in; what is behind ``#`` stays in the browser."""
+    """Address that signs a browser in; the token after ``#`` is never sent by HTTP."""
     return f"{page_address(settings)}/signin#token={token}"
 
 
 def page_address(settings: Settings) -> str:
-    """Address of the page, as others reach it."""
+    """Address of the page for other machines."""
     host = reachable_host(settings.host)
     host = f"[{host}]" if ":" in host else host
     return f"http://{host}:{settings.port}"
 
 
 def reachable_host(host: str) -> str:
-    """Address at which others reach a server; for "all addresses" one that routes."""
+    """Address of a server for other machines; for "all addresses" a routed one."""
     if host not in EVERY_ADDRESS:
         return host
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    # Addresses for documentation (RFC 3849, RFC 5737): no machine has them.
     somewhere = "2001:db8::1" if ":" in host else "192.0.2.1"
-    with socket.socket(family, socket.SOCK_DGRAM) as asking:
+    with socket.socket(family, socket.SOCK_DGRAM) as probe:
         try:
             # Nothing is sent: the system only chooses the route.
-            asking.connect((somewhere, 9))
+            probe.connect((somewhere, 9))
         except OSError:
             return "localhost"
-        return str(asking.getsockname()[0])
+        return str(probe.getsockname()[0])
 
 
-def print_sign_in_link(
-    settings: Settings, token: str, out: TextIO | None = None
-) -> None:
+def print_sign_in_link(settings: Settings, token: str) -> None:
     """Print the sign-in link; on a terminal also as a code for a phone."""
-    out = out or sys.stdout
     link = sign_in_link(settings, token)
-    print(f"iVeg: {link}", file=out, flush=True)
-    if out.isatty():
-        segno.make(link, micro=False).terminal(out, compact=True)
+    print(f"iVeg: {link}", flush=True)
+    if sys.stdout.isatty():
+        segno.make(link, micro=False).terminal(compact=True)
 
 
 def report_ready() -> None:
@@ -98,9 +95,9 @@ _YOUNG, _MIDDLE, _OLD = 20_000, 20, 50
 def tune_garbage_collection() -> None:
     """Exclude all present objects from collection; call it when everything is built.
 
-    A message creates a hundred short-lived values, none of them in a cycle.  Python
-    collects the youngest generation after each 700, and now and then all imported
-    objects, which blocks the event loop for tenths of a second.
+    A message creates a hundred short-lived values, none of them in a cycle.  By default
+    Python collects the youngest generation after each 700.  Now and then it collects
+    all imported objects, too, which blocks the event loop for tenths of a second.
     """
     gc.collect()
     gc.freeze()

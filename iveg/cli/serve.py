@@ -1,4 +1,4 @@
-"""The dashboard and decision-support system as a process."""
+"""``iveg serve``: the dashboard and decision-support system as a process."""
 
 import asyncio
 import contextlib
@@ -12,7 +12,7 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from iveg.adapters.history.engine import history_url, upgrade
-from iveg.app.dss import Dss, open_dss
+from iveg.app import App
 from iveg.asgi import create_app
 from iveg.cli.arguments import CommandCall
 from iveg.cli.running import (
@@ -27,26 +27,26 @@ from iveg.domain.errors import HopError
 from iveg.settings import Settings
 from iveg.web.bounded_http import bounded_http
 from iveg.web.live.socket import BoundedSocket
-from iveg.web.notifications import NotificationsFirst
+from iveg.web.notifications import notifications_first
 
 _log = logging.getLogger(__name__)
 _WS_MAX_BYTES = 65536
 
 
 class _Server(uvicorn.Server):
-    """A server that ends with a vital part.
+    """Server that ends with a vital part.
 
-    It leaves signals to ``run_until_stopped``, as all parts do.
+    ``run_until_stopped`` handles signals, as for all parts.
     """
 
     def __init__(
-        self, config: uvicorn.Config, dss: Dss, on_start: Callable[[], None]
+        self, config: uvicorn.Config, app: App, on_start: Callable[[], None]
     ) -> None:
         super().__init__(config)
-        self._dss, self._on_start = dss, on_start
+        self._app, self._on_start = app, on_start
 
     async def on_tick(self, counter: int) -> bool:
-        return self._dss.failure is not None or await super().on_tick(counter)
+        return self._app.failure is not None or await super().on_tick(counter)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
@@ -60,7 +60,7 @@ class _Server(uvicorn.Server):
 
 def run(call: CommandCall) -> int:
     """Run ``iveg serve``; returns the exit code."""
-    # Recordings, journals and databases show people: nobody else on the machine reads.
+    # Recordings, journals and databases show people: other users must not read them.
     os.umask(0o077)
     call.data.mkdir(parents=True, exist_ok=True)
     work = serve(call.settings, call.data, demo=call.options.demo)
@@ -68,44 +68,47 @@ def run(call: CommandCall) -> int:
 
 
 async def serve(
-    settings: Settings, data: Path, *, demo: bool, make: type[Dss] = Dss
+    settings: Settings, data: Path, *, demo: bool, make: type[App] = App
 ) -> None:
-    """The decision-support system with its page.
+    """Run the decision-support system with its page.
 
     Raises:
         VitalPartError: one of its vital parts has ended.
     """
-    await _upgrade_history(settings, data)
-    dss = open_dss(settings, data, demo=demo, make=make)
+    try:
+        await asyncio.to_thread(upgrade, history_url(settings.database_url, data))
+    except HopError as error:
+        # An absent database must not delay STOP; a newer or broken one ends the start.
+        _log.warning("the history starts without its database: %s", error)
+    app = make(settings, data, demo=demo)
     with contextlib.suppress(HopError):
-        await dss.accounts.copy_earlier()
-    app = NotificationsFirst(create_app(dss), dss.web.orion)
-    config = _config(settings, app)
+        await app.accounts.copy_earlier()
     server = _Server(
-        config,
-        dss,
-        on_start=report_ready if demo else lambda: _print_way_in(settings, dss),
+        _config(settings, notifications_first(create_app(app), app.orion)),
+        app,
+        on_start=report_ready if demo else lambda: _print_way_in(settings, app),
     )
     tune_garbage_collection()
     serving = asyncio.create_task(server.serve(), name="http")
     try:
+        # Shielded: uvicorn ends in order, by `should_exit`.
         await asyncio.shield(serving)
     except asyncio.CancelledError:
         server.should_exit = True
         await serving
-    if dss.failure is not None:
-        raise dss.failure
+    if app.failure is not None:
+        raise app.failure
 
 
-def _print_way_in(settings: Settings, dss: Dss) -> None:
-    """Print the link; without one, that of the first admin while there is none."""
-    if dss.sign_in_token:
-        print_sign_in_link(settings, dss.sign_in_token)
+def _print_way_in(settings: Settings, app: App) -> None:
+    """Print the sign-in link; without a link, an invitation while there is no admin."""
+    if app.sign_in_token:
+        print_sign_in_link(settings, app.sign_in_token)
         return
     try:
-        invitation = dss.accounts.first_invitation()
+        invitation = app.accounts.first_invitation()
     except HopError as error:
-        _log.warning("nobody can be made admin: %s", error)
+        _log.warning("no admin can be made: %s", error)
         return
     print(f"iVeg: {page_address(settings)}", flush=True)
     if invitation is not None:
@@ -113,9 +116,9 @@ def _print_way_in(settings: Settings, dss: Dss) -> None:
         print(invitation_link(settings, invitation), flush=True)
 
 
-def _config(settings: Settings, app: ASGIApp) -> uvicorn.Config:
+def _config(settings: Settings, site: ASGIApp) -> uvicorn.Config:
     return uvicorn.Config(
-        app,
+        site,
         host=settings.host,
         port=settings.port,
         log_config=None,
@@ -129,11 +132,3 @@ def _config(settings: Settings, app: ASGIApp) -> uvicorn.Config:
         timeout_graceful_shutdown=2,
         server_header=False,
     )
-
-
-async def _upgrade_history(settings: Settings, data: Path) -> None:
-    """Upgrade the history; a newer or broken database ends the start."""
-    try:
-        await asyncio.to_thread(upgrade, history_url(settings.database_url, data))
-    except HopError as error:
-        _log.warning("the history starts without its database: %s", error)

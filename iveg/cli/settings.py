@@ -1,4 +1,4 @@
-"""``iveg settings``: the page of settings."""
+"""``iveg settings``: prints the page of settings."""
 
 from iveg.cli.arguments import CommandCall
 from iveg.settings import describe

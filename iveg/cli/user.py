@@ -1,4 +1,4 @@
-"""``iveg user``: who may sign in, from the machine itself."""
+"""``iveg user``: manages accounts on the server's own machine."""
 
 import argparse
 from collections.abc import Iterable
@@ -10,7 +10,7 @@ from iveg.adapters.admission import Admission
 from iveg.adapters.database_check import check_database
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.queries import earlier_access
-from iveg.app.outside import ACCOUNTS, files_of
+from iveg.app import ACCOUNTS_FILE, files_of
 from iveg.cli.arguments import CommandCall
 from iveg.cli.running import page_address
 from iveg.domain.accounts import AccessBook, Account, find_named, name_key
@@ -22,15 +22,16 @@ from iveg.settings import Settings
 
 
 def run(call: CommandCall) -> int:
-    """One action on accounts; returns the exit code.
+    """Run an action on accounts; returns the exit code.
 
     Raises:
         IvegError: it cannot be done.
     """
     options, settings = call.options, call.settings
     url = history_url(settings.database_url, call.data)
-    file = AccessFile(files_of(url, call.data) / ACCOUNTS)
+    file = AccessFile(files_of(url, call.data) / ACCOUNTS_FILE)
     book = _known(file, url)
+    # In a second file, since a running server would overwrite the first.
     book.on_change.append(file.leave)
     try:
         print(_act(options, settings, book))
@@ -40,9 +41,10 @@ def run(call: CommandCall) -> int:
 
 
 def _known(file: AccessFile, url: str) -> AccessBook:
-    """All who are known, with the changes that no server has taken up yet."""
+    """All accounts, with changes that no server has taken up yet."""
     rows, _ = file.read()
     if not file.exists:
+        # No server has started yet, to copy accounts of an earlier version.
         check_database(url)
         rows = earlier_access(url) or rows
     book = AccessBook(rows)
@@ -53,7 +55,7 @@ def _known(file: AccessFile, url: str) -> AccessBook:
 
 
 def _act(options: argparse.Namespace, settings: Settings, book: AccessBook) -> str:
-    """One action on accounts; returns what is to be printed."""
+    """Run an action on accounts; returns the text to print."""
     now = clock.wall()
     admission = Admission(book, CONSOLE, now)
     if options.action == "list":
@@ -62,16 +64,16 @@ def _act(options: argparse.Namespace, settings: Settings, book: AccessBook) -> s
         ends_at = now + options.days * DAY_S if options.days else None
         invitation, _ = admission.add(options.name, options.role, ends_at)
         return _invited(settings, invitation)
-    found = find_named(book.accounts.values(), options.name)
-    if found is None:
+    account = find_named(book.accounts.values(), options.name)
+    if account is None:
         raise UnknownNameError("account", options.name)
     if options.action == "reset":
-        return _invited(settings, admission.reset(found)[0])
-    return f"{admission.disable(found).name} is out within a second."
+        return _invited(settings, admission.reset(account)[0])
+    return f"{admission.disable(account).name} is out within a second."
 
 
 def invitation_link(settings: Settings, invitation: str) -> str:
-    """Address of the page that asks for a password."""
+    """Address of the page at which an invited person sets a password."""
     return f"{page_address(settings)}/signin#invitation={invitation}"
 
 

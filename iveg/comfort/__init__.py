@@ -1,1 +1,1 @@
-"""Parts that may fail, and nothing vital notices: history, map, messages, goals."""
+"""Parts whose failure harms nothing vital: history, map, messages, goals."""

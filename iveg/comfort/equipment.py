@@ -1,6 +1,6 @@
-"""Watches other equipment, beside the rule loop: no rule rests on any of it.
+"""Monitoring of other equipment, beside the rule loop: no rule rests on it.
 
-What Orion notifies of an equipment's entity comes straight here and never waits with
+Orion's notifications of equipment come straight here and never wait in the queue of
 robots' observations.
 """
 
@@ -16,10 +16,10 @@ TICK_S = 1.0
 
 
 class EquipmentMonitor:
-    """Takes in values of equipment, keeps them, and reports what is wrong with it.
+    """Takes in values of equipment, keeps them, and reports faults.
 
     Attributes:
-        equipment: All tiles with what is known of them.
+        equipment: All tiles with their newest values.
     """
 
     def __init__(self, core: Core, equipment: Equipment) -> None:
@@ -30,13 +30,13 @@ class EquipmentMonitor:
         self._states: tuple[State, ...] = ()
 
     def receive(self, reading: EntityReading, at: Instant) -> None:
-        """Take in what Orion says of an entity."""
+        """Take in Orion's reading of an entity."""
         for tile in self.equipment.read(reading.entity_id, reading.attributes, at):
             self._keep(tile, at)
         self._event_log.changed(topics.EQUIPMENT.name)
 
     def tick(self, now: Instant) -> None:
-        """Let time pass: what is silent or beyond a limit becomes an alert."""
+        """Let time pass: a tile that is silent or beyond a limit raises an alert."""
         self._supervision.report(PART, self.equipment.conditions(now))
         states = tuple(self.equipment.state(tile, now) for tile in self.equipment.tiles)
         if states != self._states:
@@ -47,7 +47,7 @@ class EquipmentMonitor:
         """Record a number, once a minute."""
         value = self.equipment.status(tile).value
         kept_at = self._kept_at.get(tile.key, float("-inf"))
-        # Devices that send every minute are late as often as early.
+        # A device that sends each minute is early half of the time: a tenth of leeway.
         if value is None or at.mono - kept_at < 0.9 * READING_PERIOD_S:
             return
         self._kept_at[tile.key] = at.mono

@@ -1,7 +1,7 @@
-"""Goals: from a person's wish to the robot's own word of it.
+"""Goals: from a person's wish to the robot's answer.
 
 Comfort, and below STOP: the table of ``domain/goals`` decides, a STOP or a hold deletes
-what is open, and nothing here is sent again or reaches a STOP machine.
+open goals, and no order here is repeated or reaches a STOP machine.
 """
 
 import asyncio
@@ -44,8 +44,8 @@ class GoalDispatcher:
     """Keeps the newest goal of each robot.
 
     Args:
-        core: Whose robots.
-        machines: STOP of each robot; read alone.
+        core: Has robots, ports and log.
+        machines: STOP of each robot; only read.
     """
 
     def __init__(self, core: Core, machines: Mapping[str, StopMachine]) -> None:
@@ -57,7 +57,7 @@ class GoalDispatcher:
         self._new_id = core.ports.new_id
         self._goals: dict[str, FollowedGoal] = {}
         self._given: set[str] = set()
-        """Ids of all goals of this run: what the history has of them is our own."""
+        """Ids of all goals of this run, which ``close_earlier`` must leave open."""
         self._tasks: set[asyncio.Task[None]] = set()
 
     # --- people -------------------------------------------------------------------
@@ -73,12 +73,15 @@ class GoalDispatcher:
         pose = Pose2D(0.0, 0.0, 0.0) if robot.odometry is None else robot.odometry.pose
         start = self._start_of(robot_id)
         place = place_of(wish, self._greenhouse, robot.profile, pose, start)
-        # Why no goal at all may be given is told before what is wrong with this one.
-        here = (pose.x, pose.y) if isinstance(place, str) else place
-        goal = Goal(self._new_id(), wish.kind, round(here[0], 3), round(here[1], 3))
+        # A refusal by the robot's state comes before a fault of the goal itself.
+        position = (pose.x, pose.y) if isinstance(place, str) else place
+        goal = Goal(
+            self._new_id(), wish.kind, round(position[0], 3), round(position[1], 3)
+        )
         order = permit(robot, self._machines[robot_id].state, goal, at)
         if isinstance(place, str):
             raise refusal(robot_id, place)
+        # The old goal ends in the log before the new one begins.
         self._change(robot_id, "replaced", at)
         followed = FollowedGoal(robot_id, goal, by, at, at, wish.aisle)
         self._goals[robot_id] = followed
@@ -88,7 +91,7 @@ class GoalDispatcher:
         return followed
 
     def cancel(self, robot_id: str, by: str, at: Instant) -> FollowedGoal:
-        """Have a robot forget its goal and stay where it is.
+        """Have a robot forget its goal and stay.
 
         Raises:
             UnknownRobotError: not in the fleet.
@@ -103,20 +106,21 @@ class GoalDispatcher:
         return cancelled
 
     def _start_of(self, robot_id: str) -> Pose2D | None:
-        """Where a robot belongs: the greenhouse names a place for each, in order."""
+        """Home of a robot: the greenhouse names a place for each, in fleet order."""
         order = zip(self._world.robots, self._greenhouse.starts, strict=False)
         return dict(order).get(robot_id)
 
     # --- what comes back, and time ------------------------------------------------
 
     def take_answer(self, answer: GoalAnswer, at: Instant, _: TransportId) -> None:
-        """Take a robot's word of its goal; a copy of it changes nothing."""
+        """Take a robot's answer about its goal; a copy changes nothing."""
         goal = self._goals.get(answer.robot_id)
         if goal is None or goal.goal.goal_id != answer.id:
             return
         event = _EVENTS[answer.result]
         if event == "dropped" and goal.forgotten is None:
             self._goals[answer.robot_id] = replace(goal, forgotten=at)
+        # A goal that a hold ended is deleted, not given up by the robot.
         if answer.why == "held" and event == "dropped":
             event = "held"
         self._change(answer.robot_id, event, at, answer.why)
@@ -128,7 +132,7 @@ class GoalDispatcher:
                 self._event_log.left_over(row, None, now)
 
     def tick(self, now: Instant) -> None:
-        """Delete the goals of robots that are held, and end what waits in vain."""
+        """Delete goals of held robots, and end those whose answer is overdue."""
         for robot_id in list(self._goals):
             self.newest(robot_id, now)
 
@@ -145,8 +149,8 @@ class GoalDispatcher:
 
     def _is_held(self, robot_id: str) -> bool:
         report = self._world.robot(robot_id).safety
-        said = report is not None and (report.holds or report.reason == "hold")
-        return bool(said) or self._machines[robot_id].state != "RUNNING"
+        has_hold = report is not None and (report.holds or report.reason == "hold")
+        return bool(has_hold) or self._machines[robot_id].state != "RUNNING"
 
     def _change(
         self,
@@ -183,7 +187,7 @@ class GoalDispatcher:
         line = LogEvent("command", f"log.goal.{key}", slots, goal.robot_id)
         self._event_log.log(line, at)
         self._event_log.goal(goal, event, at)
-        self._event_log.changed(topics.ROBOT.of(goal.robot_id))
+        self._event_log.changed(topics.ROBOT.for_id(goal.robot_id))
 
     # --- sending ------------------------------------------------------------------
 
@@ -191,18 +195,21 @@ class GoalDispatcher:
         for port in self._ports:
             work = self._attempt(port, robot_id, order)
             task = asyncio.get_running_loop().create_task(work, name=f"goal-{robot_id}")
+            # The loop itself keeps only weak references to tasks.
             self._tasks.add(task)
             task.add_done_callback(self._tasks.discard)
 
     async def _attempt(
         self, port: CommandPort, robot_id: str, order: GoalOrder | CancelOrder
     ) -> None:
+        # A STOP may have come while this send waited for its turn.
         if isinstance(order, GoalOrder) and self._is_held(robot_id):
             return
         try:
             await port.goal(robot_id, order)
         except HopError as error:
-            _log.info("goal of %s: %s", robot_id, error)
+            # No repetition: a goal without an answer ends as UNCONFIRMED.
+            _log.info("goal of %s not sent: %s", robot_id, error)
 
     async def close(self) -> None:
         """Cancel the sends that are under way."""

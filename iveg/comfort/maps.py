@@ -1,9 +1,9 @@
 """Maps beside the rule loop: costmaps of scans, scans for peers, camera coverage.
 
-No robot stops for any of them.  A scan costs about as much as a hundred decisions, so
+No robot stops for a map.  A scan costs about as much as a hundred decisions, so
 one at a time is drawn, the newest of the robot that has waited longest; a
 fleet that sends more is drawn less often.  A scan that cannot be drawn is
-refused with its reason, and nothing else notices.
+refused with its reason, without any other effect.
 """
 
 from collections.abc import Callable, Iterable
@@ -30,20 +30,21 @@ from iveg.domain.tracking.sight import is_detecting
 from iveg.domain.world import World
 
 SCAN_TICK_S, COVERAGE_TICK_S = 0.05, 0.5
-"""Between two scans that are drawn or handed on, and two looks of all cameras."""
+"""Time between two scans that are drawn or handed on, and two coverage updates (s)."""
 APART_S = 0.5
-"""Between two scans of one robot for peers (s), at least."""
+"""Time between two scans of one robot for peers (s), at least."""
 _PERIOD_S = 0.25
+"""Time between two scans of one robot in the costmap (s), at least."""
 _WIDEST_M = 1000.0
-"""Longer than any greenhouse: an open field, mapped in a window round the robots."""
+"""Longer side of the largest greenhouse (m); beyond it a window follows the robots."""
 Reject = Callable[[str, str, str], None]
 
 
 class _Turns:
-    """Turns of robots by their scans: the one that has waited longest is next.
+    """Turns of robots by their scans: the robot that has waited longest is next.
 
     Args:
-        apart_s: Between two scans of one robot (s), at least.
+        apart_s: Time between two scans of one robot (s), at least.
     """
 
     def __init__(self, apart_s: float) -> None:
@@ -51,15 +52,15 @@ class _Turns:
         self._taken: dict[str, tuple[float, LaserScan]] = {}
 
     def next(self, robots: Iterable[RobotState], now: Instant) -> RobotState | None:
-        """Take the turn of a robot with a new scan; None: none is due."""
-        due = [robot for robot in robots if self._is_due(robot, now)]
-        robot = min(due, key=self._at, default=None)
+        """The robot whose new scan is due; its turn counts as taken.  None: none is."""
+        due_robots = [robot for robot in robots if self._is_due(robot, now)]
+        robot = min(due_robots, key=self._at, default=None)
         if robot is not None and robot.scan is not None:
             self._taken[robot.robot_id] = now.mono, robot.scan
         return robot
 
     def newest_at(self, robot_id: str | None) -> float | None:
-        """The newest turn of a robot, or of any (monotonic, s); None: never."""
+        """Newest turn of a robot, or of any robot (monotonic, s); None: never."""
         names = self._taken if robot_id is None else {robot_id} & self._taken.keys()
         return max((self._taken[name][0] for name in names), default=None)
 
@@ -78,7 +79,7 @@ class Mapper:
 
     Args:
         bounds: The outer wall of the greenhouse.
-        reject: Told of a scan that cannot be drawn: robot, reason, detail.
+        reject: Counts a scan that cannot be drawn: robot, reason, detail.
     """
 
     def __init__(self, world: World, bounds: Rectangle, reject: Reject) -> None:
@@ -86,7 +87,7 @@ class Mapper:
         wide = max(bounds.xmax - bounds.xmin, bounds.ymax - bounds.ymin)
         self._is_open = wide > _WIDEST_M
         self._grid = None if self._is_open else Grid.over(bounds)
-        # By robot; the fleet shares that of None.
+        # Key: robot; None is the grid that the fleet shares.
         self._drawn: dict[str | None, Occupancy] = {}
         self._turns = _Turns(_PERIOD_S)
 
@@ -101,14 +102,15 @@ class Mapper:
         return _costs(self._drawn.get(None), zones, now)
 
     def age_s(self, robot_id: str | None, now: Instant) -> float | None:
-        """Since the newest scan of one robot, or of any, was drawn (s); None: never."""
+        """Age of the newest drawn scan, of a robot or of any (s); None: never."""
         at = self._turns.newest_at(robot_id)
         return None if at is None else now.mono - at
 
-    def of(
+    def of_robot(
         self, robot_id: str, zones: Iterable[Zone], now: Instant
     ) -> InflatedGrid | None:
         """Costmap of one robot: its own scans, people and peers of its feedback."""
+        # Its own zone would surround the robot with cost wherever it goes.
         others = [zone for zone in zones if zone.cause != robot_id]
         return _costs(self._drawn.get(robot_id), others, now)
 
@@ -120,7 +122,7 @@ class Mapper:
         try:
             sweep = sweep_of(scan, pose, self._grid)
         except Exception as error:
-            # One robot's scan ends neither this part nor the drawing of the others.
+            # One robot's scan must end neither this part nor the drawing of others.
             self._reject(robot.robot_id, "undrawable_scan", repr(error))
             return
         for key in (None, robot.robot_id):
@@ -140,6 +142,7 @@ def _added(
     occupancy = Occupancy(grid) if known is None else known
     if occupancy.grid != grid:
         occupancy = occupancy.moved_to(grid)
+    # First fade, so that the new sweep counts in full.
     occupancy.fade(now.mono)
     occupancy.add(sweep)
     return occupancy
@@ -151,18 +154,19 @@ def _costs(
     if occupancy is None:
         return None
     occupancy.fade(now.mono)
+    # Zones of a replay lie in the map of its recording, not in ours.
     return occupancy.costs(zone for zone in zones if zone.recording is None)
 
 
 class PeerScans:
-    """Hands scans on while any robot asks in its safety report.
+    """Hands scans on while any robot asks for them in its safety report.
 
     Never two in one turn, so that no feedback waits behind a burst.
 
     Args:
-        reject: Told of a scan that cannot be drawn: robot, reason, detail.
-        publish: Takes what is told.
-        boot: Of iVeg, as in feedback.
+        reject: Counts a scan that cannot be drawn: robot, reason, detail.
+        publish: Sends a scan to the robots that asked.
+        boot: Boot of iVeg, as in its feedback.
     """
 
     def __init__(
@@ -180,11 +184,13 @@ class PeerScans:
         """Hand on the scan of the robot that has waited longest, if one is due."""
         robots = [*self._world.live_robots()]
         asking = {robot.robot_id for robot in robots if _asks(robot, now)}
+        # Only where another robot asks; half of the age that readers accept is left
+        # for the way to them.
         robot = self._turns.next(
             (
-                one
-                for one in robots
-                if asking - {one.robot_id} and _age_s(one, now) <= OLDEST_S / 2
+                robot
+                for robot in robots
+                if asking - {robot.robot_id} and _age_s(robot, now) <= OLDEST_S / 2
             ),
             now,
         )
@@ -198,7 +204,7 @@ class PeerScans:
         try:
             peer_scan = peer_scan_of(scan, pose, max(0.0, _age_s(robot, now)))
         except Exception as error:
-            # One robot's scan ends neither this part nor what others are told.
+            # One robot's scan must end neither this part nor the scans of others.
             self._reject(robot.robot_id, "undrawable_scan", repr(error))
             return
         self._seq += 1
@@ -207,7 +213,7 @@ class PeerScans:
 
 
 def _age_s(robot: RobotState, now: Instant) -> float:
-    """Since a robot's newest scan came (s); infinite before the first."""
+    """Age of a robot's newest scan, since it came (s); infinite before the first."""
     received = robot.scan_received
     return float("inf") if received is None else now.mono - received.mono
 
@@ -218,10 +224,10 @@ def _asks(robot: RobotState, now: Instant) -> bool:
 
 
 class CoverageMonitor:
-    """When each cell of the aisles was last in view.
+    """Moments at which each cell of the aisles was last in view.
 
     Attributes:
-        coverage: What was looked at, and when.
+        coverage: The cells, each with that moment.
     """
 
     def __init__(self, world: World, greenhouse: Greenhouse) -> None:
@@ -233,5 +239,5 @@ class CoverageMonitor:
         self.coverage.update(self._world.live_robots(), now)
 
     def cameras(self, now: Instant) -> int:
-        """Number of cameras that work now, wherever they are."""
+        """Number of cameras that work now."""
         return sum(is_detecting(robot, now) for robot in self._world.live_robots())

@@ -1,8 +1,8 @@
-"""Messages to people outside iVeg: beside everything, in the way of nothing.
+"""Messages to people outside iVeg, which hold up nothing else.
 
 ``enqueue_raised`` is called where alerts are raised and only fills bounded queues.
-Each address has a task of its own, which sends what waits as one message and rests.
-What was not taken waits on: the message says since when.
+Each address has a task of its own, which sends all waiting alerts as one message and
+rests.  Alerts of a failed message stay queued; the next message says since when.
 """
 
 import asyncio
@@ -33,8 +33,8 @@ class Pace:
     """Time between messages to one address, and for one message.
 
     Attributes:
-        rest_s: Between two of them: a flood of alerts is two messages a minute.
-        limit_s: A message that takes longer counts as failed; its end is awaited.
+        rest_s: Pause after a message (s): a flood of alerts is two messages a minute.
+        limit_s: A message that takes longer (s) counts as failed; its end is awaited.
     """
 
     rest_s: float = 30.0
@@ -54,14 +54,12 @@ class Messenger:
     """Sends alerts to the addresses of a plan.
 
     Args:
-        send: Brings a message to an address; returns why it was not taken, or None.
+        send: Brings a message to an address; returns the reason of a failure, or None.
         write: Makes the message of some alerts; the flag says that they escalate.
-        alerts: Raised, and still waiting.
+        alerts: Alerts that are still waiting for somebody.
 
     Attributes:
-        counters: Messages that were taken and not, alerts that were dropped.
-        rest_s: Between two messages to one address (s).
-        limit_s: A message that takes longer is told as failed (s).
+        counters: Messages that were taken or failed, and alerts that were dropped.
     """
 
     def __init__(
@@ -89,7 +87,7 @@ class Messenger:
             self._enqueue(AlertItem(alert.last.priority, alert.last.raised))
 
     def escalate(self) -> None:
-        """Queue for the second list whatever nobody has acknowledged for too long."""
+        """Queue alerts that are unacknowledged for too long for the second list."""
         now = self._clock().mono
         unseen = {
             alert.alert_id: alert for alert in self._alerts.waiting if alert.unseen
@@ -113,8 +111,9 @@ class Messenger:
 
     def _enqueue(self, item: AlertItem, *, escalates: bool = False) -> None:
         for line in self._lines:
-            to = line.address
-            if to.escalates == escalates and item.priority <= to.least:
+            address = line.address
+            if address.escalates == escalates and item.priority <= address.least:
+                # A full deque drops its oldest by itself.
                 self.counters["messages.dropped"] += len(line.items) == MOST_WAITING
                 line.items.append(item)
                 line.filled.set()
@@ -123,6 +122,7 @@ class Messenger:
         while True:
             await line.filled.wait()
             items = list(line.items)
+            # Emptied before the send: alerts that come meanwhile are the next message.
             line.items.clear()
             line.filled.clear()
             if not await self._is_taken(line.address, items):
@@ -132,22 +132,26 @@ class Messenger:
 
     async def _is_taken(self, to: Address, items: Sequence[AlertItem]) -> bool:
         sending = asyncio.ensure_future(self._send(to, items))
-        done, _ = await asyncio.wait([sending], timeout=self._pace.limit_s)
-        if not done:
+        finished, _ = await asyncio.wait([sending], timeout=self._pace.limit_s)
+        if not finished:
             self._failed(to, "no answer")
+        # The end of the send decides: a taken message must not be repeated.
         failed = await sending
         if failed is not None:
             self._failed(to, failed)
             return False
         self.counters["messages.sent"] += 1
-        self._logged = {(name, why) for name, why in self._logged if name != to.name}
+        # The address works, so its next failure is news and is logged.
+        self._logged = {
+            (name, reason) for name, reason in self._logged if name != to.name
+        }
         return True
 
     async def _send(self, to: Address, items: Sequence[AlertItem]) -> str | None:
         try:
             return await self._send_message(to, self._write(items, to.escalates))
         except Exception as error:
-            # Of the error nothing more: it may name the address.
+            # Only the type: the error's text may hold the address.
             return type(error).__name__
 
     def _failed(self, to: Address, why: str) -> None:

@@ -12,33 +12,35 @@ from iveg.domain.situation import (
     Near,
     RobotFacts,
     Situation,
+    situation_alerts,
     situation_of,
-    told_of,
 )
 from iveg.domain.stop.machine import StopMachine
-from iveg.domain.tracking.person import TrackedPerson
+from iveg.domain.tracking.tracker import TrackedPerson
 from iveg.vital.evaluate import Evaluator
 
 _AT_A_ZONE_M = 0.5
-"""Somebody so far outside of a zone stands at its edge, by the noise of both places."""
+"""Tolerance (m) of "at the edge of a zone": the noise of both positions."""
 
 
 class Situations:
     """Reads the pipeline's state; keeps nothing.
 
     Args:
-        evaluator: Whose world, people and alerts.
+        evaluator: Has the world, people and alerts.
     """
 
     def __init__(self, evaluator: Evaluator) -> None:
         self._evaluator = evaluator
 
-    def of(self, robot: RobotState, machine: StopMachine, now: Instant) -> Situation:
+    def situation(
+        self, robot: RobotState, machine: StopMachine, now: Instant
+    ) -> Situation:
         """Situation of one robot."""
         limit = self._evaluator.speed_limits[robot.robot_id]
         report, alerts = fresh_report(robot, now), self._alerts(robot.robot_id)
         around = _Surroundings(self._evaluator, robot, now)
-        once, out = machine.once, robot.detector.out_of_service
+        once, out = machine.order, robot.detector.out_of_service
         facts = RobotFacts(
             robot_id=robot.robot_id,
             link=robot.link(now),
@@ -50,9 +52,9 @@ class Situations:
             unmet=self._evaluator.unmet(robot.robot_id),
             doubts=robot.doubts.active(now),
             alerts=alerts,
-            alert_about=around.of_alert(alerts[0]) if alerts else None,
-            near=None if report is None else around.of_report(report, limit),
-            told_near=around.of_limit(limit),
+            alert_about=around.near_alert(alerts[0]) if alerts else None,
+            near=None if report is None else around.near_report(report, limit),
+            limit_near=around.near_limit(limit),
             stop=machine.state,
             is_resuming=once is not None and once.kind == "resume",
             out_of_service_by=None if out is None else out.by,
@@ -63,10 +65,10 @@ class Situations:
 
     def _alerts(self, robot_id: str) -> list[Condition]:
         """Conditions of a robot or the fleet that are a situation."""
-        return told_of(
-            one.condition
-            for one in self._evaluator.alerts.waiting
-            if one.cleared is None and one.condition.robot_id in (robot_id, None)
+        return situation_alerts(
+            alert.condition
+            for alert in self._evaluator.alerts.waiting
+            if alert.cleared is None and alert.condition.robot_id in (robot_id, None)
         )
 
 
@@ -78,39 +80,41 @@ class _Surroundings:
     robot: RobotState
     now: Instant
 
-    def of_alert(self, alert: Condition) -> Near | None:
+    def near_alert(self, alert: Condition) -> Near | None:
         """Person or robot of an alert, at the distance that the alert says."""
         about, distance_m = alert.slots.get("person"), alert.slots.get("distance")
         if not isinstance(about, str):
             return None
-        found = self._named(about)
-        if found is not None and isinstance(distance_m, float):
-            found = replace(found, distance_m=distance_m)
-        return self._nearest(found)
+        near = self._named(about)
+        if near is not None and isinstance(distance_m, float):
+            near = replace(near, distance_m=distance_m)
+        return self._nearest(near)
 
-    def of_report(self, report: SafetyReport, limit: SpeedLimit) -> Near | None:
+    def near_report(self, report: SafetyReport, limit: SpeedLimit) -> Near | None:
         """Person or robot that a robot reports as its reason.
 
-        It judges alerts by its own pose, too, and may be ahead of our speed limit; it
-        then names the alert.
+        A robot also judges alerts by its own pose.  So it may slow down before our
+        speed limit does, and then names the alert.
         """
         if report.reason not in HAZARDS:
             return None
         return self._nearest(self._cause(report, limit))
 
-    def of_limit(self, limit: SpeedLimit) -> Near | None:
+    def near_limit(self, limit: SpeedLimit) -> Near | None:
         """Person or robot of our speed limit."""
         return self._nearest(self._limited(limit)) if limit.reason in HAZARDS else None
 
     def _cause(self, report: SafetyReport, limit: SpeedLimit) -> Near:
         if report.reason == limit.reason and report.cause in (None, limit.cause):
+            # Both agree, and our limit knows the distance.
             return self._limited(limit)
+        # A robot may name the decision, the person, or both.
         named = {report.decision_id, report.cause} - {None}
-        for one in self.evaluator.people.known.values():
-            if {one.decision_id, one.person_id} & named:
-                return self._person(one)
-        seen = self._named(report.cause)
-        return seen or Near(report.reason, distance_m=_to_obstacle(self.robot, report))
+        for person in self.evaluator.people.known.values():
+            if {person.decision_id, person.person_id} & named:
+                return self._person(person)
+        cause = self._named(report.cause)
+        return cause or Near(report.reason, distance_m=_to_obstacle(self.robot, report))
 
     def _limited(self, limit: SpeedLimit) -> Near:
         return replace(
@@ -122,31 +126,31 @@ class _Surroundings:
         )
 
     def _nearest(self, near: Near | None) -> Near | None:
-        """The person to name: the nearest who is seen now, else who slows the robot.
+        """Person to name: the nearest in sight, else the person who slows the robot.
 
-        The place of somebody who is out of sight is no distance to anybody, so whoever
-        stands about as near as a zone is wide comes first.
+        The remembered place of a person out of sight is no measured distance.  So a
+        person in sight within about the radius of a zone is named first.
         """
         if near is None or near.kind != "person":
             return near
         people = self.evaluator.people
-        seen = (
-            self._person(one)
-            for one in people.known.values()
-            if one.class_ == "person"
-            and one.age_s(self.now) <= LIMITS.seen_s
-            and people.things.explain(one, self.now) is None
+        in_sight = (
+            self._person(person)
+            for person in people.known.values()
+            if person.class_ == "person"
+            and person.age_s(self.now) <= LIMITS.seen_s
+            and people.things.explain(person, self.now) is None
         )
-        placed = [one for one in seen if one.distance_m is not None]
-        found = min(placed, key=_distance, default=near)
-        radius_m = self.evaluator.rule.radius_m.of("person")
+        placed = [person for person in in_sight if person.distance_m is not None]
+        nearest = min(placed, key=_distance, default=near)
+        radius_m = self.evaluator.rule.radius_m.for_class("person")
         reach_m = max(_distance(near), radius_m + _AT_A_ZONE_M)
-        if found.about == near.about or _distance(found) > reach_m:
+        if nearest.about == near.about or _distance(nearest) > reach_m:
             return near
-        return found
+        return nearest
 
     def _named(self, about: str | None) -> Near | None:
-        """A person or robot by its id; None where nothing of it is known."""
+        """A person or robot by its id; None: unknown."""
         peer = self.evaluator.world.robots.get(about or "")
         if peer is None:
             known = self.evaluator.people.known.get(about or "")
@@ -158,7 +162,7 @@ class _Surroundings:
         return Near("robot", about, distance_m)
 
     def _person(self, person: TrackedPerson) -> Near:
-        """A person, or a robot that is not of the fleet."""
+        """A track: a person, or a robot outside the fleet."""
         x, y = person.newest.x, person.newest.y
         odometry = self.robot.odometry
         return Near(
@@ -175,7 +179,7 @@ def _distance(near: Near) -> float:
 
 
 def fresh_report(robot: RobotState, now: Instant) -> SafetyReport | None:
-    """A robot's newest report, while that says something of now."""
+    """A robot's newest report; None once it is too old to hold now."""
     received = robot.safety_received
     if received is None or now.mono - received.mono > LIMITS.report_stale_s:
         return None
@@ -183,7 +187,7 @@ def fresh_report(robot: RobotState, now: Instant) -> SafetyReport | None:
 
 
 def _to_obstacle(robot: RobotState, report: SafetyReport) -> float | None:
-    """Distance to what a robot's laser sees (m); None: nothing, or nobody knows."""
+    """Distance to the obstacle that a robot reports (m); None: unknown or none."""
     obstacle, odometry = report.obstacle, robot.odometry
     if report.reason != "obstacle" or obstacle is None or odometry is None:
         return None

@@ -2,7 +2,7 @@
 
 It takes the same frames, reports and ticks at the same moments, and has people, zones
 and entries of its own.  No feedback, decision or alert knows of it
-(``tests/properties/test_shadow``).  iVeg's end ends it.
+(``tests/properties/test_shadow``).  It ends when iVeg does.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -12,6 +12,7 @@ from itertools import count
 from typing import Final
 
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.detector import judge_frame
 from iveg.domain.errors import TrialRefusedError
 from iveg.domain.observations import DetectionFrame, Instant, SafetyReport
 from iveg.domain.rule.trial import Account, Limits, Trial
@@ -23,32 +24,32 @@ from iveg.vital.operators import Rules
 
 PART: Final = "shadow-rule"
 _SETTLES_S: Final = 2.0
-"""Until then it may still miss what those in force remember of earlier looks."""
+"""Time in which a new trial may lack looks of the rule in force (s)."""
 
 
-class ShadowRun:
-    """One trial, with people and entries of its own over the world, which it reads."""
+class TrialRun:
+    """A trial with its own people and zone entries, over the world, which it reads."""
 
     def __init__(self, trial: Trial, evaluator: Evaluator, now: Instant) -> None:
         self.account = Account(trial)
         self._world, self._own_sight = evaluator.world, OwnSight(evaluator.greenhouse)
         self._trial, self._rule = trial, trial.rule
-        # It begins with what those in force know by now.
+        # It begins with the present people and limits, not with an empty map.
         self._people, self._limits = evaluator.beginning()
         self._counts_from = now.mono + _SETTLES_S
         self._ids = count()
 
-    def looked(self, frame: DetectionFrame, seen_at: Instant, at: Instant) -> None:
-        """Take a detection frame, and when it came."""
+    def take_frame(self, frame: DetectionFrame, seen_at: Instant, at: Instant) -> None:
+        """Take a detection frame that was seen at a moment and received at ``at``."""
         known, robot = self._people, self._world.robot(frame.robot_id)
-        answered = self._world.word_answers.persons(frame.detector or frame.robot_id)
-        rule = self._rule.also_naming(answered)
-        placed = known.sight(frame, self._world, rule, seen_at, self._new_id())
-        self._own_sight.take(Look.of_frame(robot, frame, placed, at), known)
+        listed, answers = robot.description.classes, self._world.word_answers
+        judged = judge_frame(frame, self._rule, listed, answers)
+        placed = known.sight(judged, robot, self._world, seen_at, self._new_id())
+        self._own_sight.take(Look.from_frame(robot, judged.frame, placed, at), known)
 
-    def witnessed(self, report: SafetyReport, at: Instant) -> None:
+    def take_obstacle(self, report: SafetyReport, at: Instant) -> None:
         """Take an obstacle of a robot's laser."""
-        self._people.witness(report, at, self._new_id())
+        self._people.track_obstacle(report, at, self._new_id())
 
     def aged(self, now: Instant) -> None:
         """Let people age."""
@@ -61,17 +62,18 @@ class ShadowRun:
         changes: Iterable[LimitChange],
         now: Instant,
     ) -> None:
-        """Judge by the candidate, and compare with what the rule in force gave."""
-        would, crossed = self._limits.evaluate(
+        """Judge by the candidate, and compare with the result of the rule in force."""
+        own_limits, own_changes = self._limits.evaluate(
             self._world, self._people, self._rule, now, self._new_id()
         )
         if now.mono < self._counts_from:
             return
-        if not self.account.is_of(rule):
+        if not self.account.compares_with(rule):
+            # Sums against the version before would mix two comparisons.
             anew = replace(self._trial, since=now.wall, so_far=None, differences=())
             self.account = Account(anew)
         self.account.judged(
-            rule, self._live(limits, changes), self._live(would, crossed), now
+            rule, self._live(limits, changes), self._live(own_limits, own_changes), now
         )
 
     def _live(
@@ -79,49 +81,50 @@ class ShadowRun:
     ) -> tuple[Limits, Sequence[LimitChange]]:
         """Limits and changes of live robots."""
         live = {robot.robot_id for robot in self._world.live_robots()}
-        of_live = {name: one for name, one in limits.items() if name in live}
-        return of_live, [one for one in changes if one.entry.robot_id in live]
+        live_limits = {name: limit for name, limit in limits.items() if name in live}
+        return live_limits, [
+            change for change in changes if change.entry.robot_id in live
+        ]
 
     def _new_id(self) -> str:
         return f"shadow-{next(self._ids)}"
 
 
 class Trials:
-    """Begins, ends and promotes trials by an operator's word.
+    """Begins, ends and promotes trials on an operator's order.
 
     Args:
-        core: Its supervision tells a trial what happens, at the same moments as those
-            in force.
+        core: Its supervision passes events to a trial when they happen.
     """
 
     def __init__(self, core: Core, evaluator: Evaluator, rules: Rules) -> None:
         self._evaluator, self._rules = evaluator, rules
-        self._running: ShadowRun | None = None
+        self._running: TrialRun | None = None
         core.supervision.listen(
             PART,
-            frame_taken=partial(self._follow, ShadowRun.looked),
-            obstacle_reported=partial(self._follow, ShadowRun.witnessed),
-            aged=partial(self._follow, ShadowRun.aged),
-            judged=partial(self._follow, ShadowRun.judged),
+            frame_taken=partial(self._follow, TrialRun.take_frame),
+            obstacle_reported=partial(self._follow, TrialRun.take_obstacle),
+            aged=partial(self._follow, TrialRun.aged),
+            judged=partial(self._follow, TrialRun.judged),
         )
 
     @property
     def current(self) -> Trial | None:
-        """The trial as it stands; None: nothing is tried."""
+        """The trial with its account so far; None: there is no trial."""
         return None if self._running is None else self._running.account.trial()
 
     def start(self, trial: Trial, now: Instant) -> None:
         """Run a trial from now on."""
-        self._running = ShadowRun(trial, self._evaluator, now)
+        self._running = TrialRun(trial, self._evaluator, now)
 
     def _follow(self, take: Callable[..., None], *facts: object) -> None:
-        """Have the trial take what those in force did; what fails ends it."""
+        """Have the trial take an event; a failure ends the trial."""
         if self._running is None:
             return
         try:
             take(self._running, *facts)
         except Exception:
-            # What it says from here on would be wrong.
+            # It has missed an event, so its further account would be wrong.
             self._running = None
             raise
 
@@ -150,11 +153,11 @@ class Trials:
         return trial
 
     async def promote(self, by: str, at: Instant, seen: int) -> DetectionRule:
-        """Put the candidate in force, with what came of the trial; that ends.
+        """Put the candidate in force, with the result of its trial, which ends.
 
         Raises:
             TrialRefusedError: nothing is tried.
-            OutdatedError: another version is in force than was seen.
+            OutdatedError: another version than the seen one is in force.
             HopError: it could not be written down; the old version stays in force.
         """
         trial, running = self._tried(), self._running
@@ -171,11 +174,11 @@ class Trials:
         return trial
 
 
-def is_same(one: DetectionRule, other: DetectionRule) -> bool:
+def is_same(first: DetectionRule, second: DetectionRule) -> bool:
     """Whether two versions judge alike."""
-    return _judges(one) == _judges(other)
+    return _judges(first) == _judges(second)
 
 
 def _judges(rule: DetectionRule) -> DetectionRule:
-    """A version without what judges nothing."""
+    """A version without the fields that judge nothing."""
     return replace(rule, id="", version=0, author="", since=None, comparison=None)

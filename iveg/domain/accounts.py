@@ -1,9 +1,9 @@
 """Access: accounts, tokens of programs, sessions, and claims of providers.
 
-A name travels with each STOP through Orion, which refuses some characters with the
-whole update they stand in; such a name would stop nothing by that transport.  All of
-it is held in memory while iVeg runs: neither a disk nor a database that is away, slow
-or damaged changes who may stop.
+The name of a person goes with each STOP through Orion.  Orion refuses an
+update that has certain characters, so a STOP by that transport would fail for such a
+name.  All of this is in memory while iVeg runs, so a missing, slow or damaged disk
+or database does not change who may stop.
 """
 
 import hashlib
@@ -17,20 +17,21 @@ from iveg.domain.errors import NameTakenError, SignOnError
 from iveg.domain.records import Json
 
 SignInMethod = Literal["link", "password", "sso", "token"]
-"""Proof of an identity: ``sso`` is the identity provider's, ``token`` a program's."""
-OF_ACCOUNTS: Final = frozenset({"password", "sso"})
-"""Methods of people with an account, which decides over their sessions."""
+"""Proof of an identity: ``sso`` by an identity provider, ``token`` of a program."""
+ACCOUNT_METHODS: Final = frozenset({"password", "sso"})
+"""Methods of people with an account, by which their sessions end."""
 PersonRole = Literal["viewer", "operator", "admin"]
 AccountState = Literal["active", "invited", "over", "disabled"]
-"""``over``: ended by itself."""
+"""``over``: its time has ended."""
 TokenScope = Literal["read", "stop", "operate"]
-"""Rights of a program: read; also stop; also release, resume and all else of people."""
+"""Rights of a program, each with those before it; ``operate``: all of an operator."""
 
 LINK_PERSON: Final = "link"
-"""Id of whoever holds the link of the environment."""
+"""Id of the person who uses the link of the environment."""
 DEFAULT_NAME: Final = "operator"
-"""The name of that person where the settings give none."""
+"""Name of that person without a setting."""
 MOST_NAME: Final = 64
+"""Greatest length of a name (characters)."""
 _REFUSED: Final = frozenset("<>\"'=;()")
 _RESERVED: Final = frozenset(
     {"console", "iveg", "link", "nobody", "program", DEFAULT_NAME}
@@ -38,7 +39,7 @@ _RESERVED: Final = frozenset(
 
 
 def is_name(text: str) -> bool:
-    """Whether a person may be called so: short, visible, and taken by Orion."""
+    """Whether a text may be a name: short, visible, and accepted by Orion."""
     return (
         0 < len(text) <= MOST_NAME
         and text == unicodedata.normalize("NFC", text).strip()
@@ -48,17 +49,17 @@ def is_name(text: str) -> bool:
 
 
 def is_reserved(name: str) -> bool:
-    """Whether the record calls somebody so who has no account, as iVeg itself."""
+    """Whether the log uses a name for an actor without an account, such as iVeg."""
     return name_key(name) in _RESERVED
 
 
 def name_key(name: str) -> str:
-    """Key that two names may not share: case and width do not tell people apart."""
+    """Key that two names may not share, without case and width of characters."""
     return unicodedata.normalize("NFKC", name).casefold().strip()
 
 
 def digest_of(secret: str) -> str:
-    """SHA-256 (hex) of an invitation or a token, which is all that is kept of it."""
+    """SHA-256 (hex) of an invitation or a token; nothing else of it is stored."""
     return hashlib.sha256(secret.encode()).hexdigest()
 
 
@@ -67,13 +68,16 @@ class Account:
     """A person who may sign in.
 
     Attributes:
-        account_id: Never given anew, as names may be.
-        password: Its hash (PHC string format); empty until the invitation is accepted.
-        ends_at: When it closes by itself (Unix s); None: never.
-        invitation: SHA-256 of what is waited for (hex); empty: nothing.
-        invited_until: When the invitation is over (Unix s).
-        since: Sessions that began before are over (Unix s): a new role or password.
-        provider: Issuer that vouches for the person and gives the role; empty: none.
+        account_id: Id, never used again; a name may be.
+        name: Name of the person.
+        role: Role of the person.
+        password: Hash (PHC string format); empty until the invitation is accepted.
+        disabled: Whether an admin closed it.
+        ends_at: Time at which it closes by itself (Unix s); None: never.
+        invitation: SHA-256 of the open invitation (hex); empty: there is none.
+        invited_until: Time at which the invitation ends (Unix s).
+        since: Last change of role or password (Unix s), which ended all sessions.
+        provider: Issuer that identifies the person and gives the role; empty: none.
     """
 
     account_id: str
@@ -88,7 +92,7 @@ class Account:
     provider: str = ""
 
     def is_open(self, now: float) -> bool:
-        """Whether the person may be here at this moment (Unix s)."""
+        """Whether the account is open at this moment (Unix s)."""
         return not self.disabled and (self.ends_at is None or now < self.ends_at)
 
     def state(self, now: float) -> AccountState:
@@ -100,12 +104,16 @@ class Account:
 
 @dataclass(frozen=True, slots=True)
 class ApiToken:
-    """A program that may call, by a token of which the digest is kept.
+    """A program with a token, of which only the digest is stored.
 
     Attributes:
+        token_id: Id of the token.
+        name: Name of the program.
+        scope: Rights of the program.
         digest: SHA-256 of the token (hex).
-        made_at: When (Unix s); ``used_at`` when it was used last, to a minute.
-        ends_at: When it ends by itself (Unix s); None: never.
+        made_at: Time of its making (Unix s).
+        used_at: Last use, to a minute (Unix s); None: never used.
+        ends_at: Time at which it ends by itself (Unix s); None: never.
     """
 
     token_id: str
@@ -127,10 +135,11 @@ class Session:
 
     Attributes:
         digest: SHA-256 of the token (hex).
-        role: What they were when they came.
-        began: Unix time of the sign-in (s).
+        name: Name of the person.
+        role: Role at the sign-in.
+        began: Time of the sign-in (Unix s).
         person: Id of the account; empty in sessions of earlier versions.
-        method: How they signed in.
+        method: Method of the sign-in.
     """
 
     digest: str
@@ -141,19 +150,14 @@ class Session:
     method: SignInMethod = "link"
 
     @property
-    def key(self) -> bytes:
-        """The digest, by which a session is found."""
-        return bytes.fromhex(self.digest)
-
-    @property
     def session_id(self) -> str:
-        """Names it to people; tells nobody the digest, and lets nobody in."""
+        """Id for display: it does not give the digest away, and opens nothing."""
         return digest_of(f"id:{self.digest}")[:16]
 
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """All who may come in, at one moment."""
+    """Accounts, tokens and sessions at one moment."""
 
     accounts: tuple[Account, ...] = ()
     tokens: tuple[ApiToken, ...] = ()
@@ -161,15 +165,19 @@ class Access:
 
 
 MOST_SESSIONS: Final = 1000
+"""Greatest number of sessions in memory; one more ends the oldest."""
 
 
 @dataclass(frozen=True, slots=True)
 class AccessChange:
-    """A change of somebody's rights, as the audit tells it.
+    """A change of rights, as in the audit.
 
     Attributes:
-        row: What is kept from now on.
-        gone: It is kept no longer.
+        action: Key of the action in the audit.
+        row: The account or token after the change.
+        details: Details for the audit.
+        gone: Whether the token is deleted.
+        by: The person who changed it.
     """
 
     action: str
@@ -180,22 +188,25 @@ class AccessChange:
 
 
 class AccessBook:
-    """Accounts by id, tokens by digest (hex), sessions by digest.
+    """Accounts by id, tokens and sessions by digest (hex).
 
     Attributes:
-        on_change: Told of each change of rights, once it counts.
-        on_keep: Called when something is to be remembered; they return at once.
+        accounts: Accounts by id.
+        tokens: Tokens by digest (hex).
+        sessions: Sessions by digest.
+        on_change: Called after each change of rights.
+        on_keep: Called when something is to be stored; they return at once.
     """
 
     def __init__(self, kept: Access = Access()) -> None:
         self.accounts = {account.account_id: account for account in kept.accounts}
         self.tokens = {token.digest: token for token in kept.tokens}
-        self.sessions = {session.key: session for session in kept.sessions}
+        self.sessions = {session.digest: session for session in kept.sessions}
         self.on_change: list[Callable[[AccessChange], None]] = []
         self.on_keep: list[Callable[[], None]] = []
 
     def picture(self) -> Access:
-        """All of it at this moment."""
+        """Accounts, tokens and sessions at this moment."""
         return Access(
             tuple(self.accounts.values()),
             tuple(self.tokens.values()),
@@ -203,12 +214,13 @@ class AccessBook:
         )
 
     def keep(self) -> None:
-        """Have what is known now remembered."""
+        """Have the present state stored."""
         for keep in self.on_keep:
             keep()
 
     def add(self, earlier: Access) -> None:
-        """Take in what is not known yet."""
+        """Add entries of an earlier state that are not known yet."""
+        # The right side of a union wins: the present state.
         before = AccessBook(earlier)
         self.accounts = before.accounts | self.accounts
         self.tokens = before.tokens | self.tokens
@@ -216,10 +228,10 @@ class AccessBook:
         self.keep()
 
     def apply(self, change: AccessChange) -> None:
-        """Have a change count, from the next request of each session on, too.
+        """Apply a change; it counts from the next request of each session.
 
         Raises:
-            NameTakenError: somebody or some program else is called so.
+            NameTakenError: another person or program has the name.
         """
         row = change.row
         if isinstance(row, Account):
@@ -228,8 +240,8 @@ class AccessBook:
                 raise NameTakenError(row.name)
             self.accounts[row.account_id] = row
         else:
-            taken = find_named(self.tokens.values(), row.name)
-            if taken is not None and taken.token_id != row.token_id:
+            holder = find_named(self.tokens.values(), row.name)
+            if holder is not None and holder.token_id != row.token_id:
                 raise NameTakenError(row.name)
             self.tokens.pop(row.digest, None)
             if not change.gone:
@@ -239,16 +251,16 @@ class AccessBook:
         self.keep()
 
     def put(self, account: Account) -> None:
-        """Keep a new state of an account, which is no change of rights."""
+        """Store a new state of an account that changes no rights."""
         self.accounts[account.account_id] = account
         self.keep()
 
     def open(self, session: Session) -> None:
-        """Let a session begin; of too many the oldest ends."""
+        """Open a session; one too many ends the oldest."""
         known = self.sessions
         if len(known) >= MOST_SESSIONS:
             del known[min(known, key=lambda digest: known[digest].began)]
-        self.sessions[session.key] = session
+        self.sessions[session.digest] = session
         self.keep()
 
 
@@ -256,7 +268,7 @@ _Row = TypeVar("_Row", Account, ApiToken)
 
 
 def find_named(known: Iterable[_Row], name: str) -> _Row | None:
-    """The person or program of this name, as people write it; None: nobody."""
+    """The account or token with a name, by its key; None: there is none."""
     key = name_key(name)
     return next((row for row in known if name_key(row.name) == key), None)
 
@@ -270,23 +282,27 @@ SignOnFailure = Literal[
     "disabled",
     "busy",
 ]
-"""Why a sign-in at the provider let nobody in: it did not answer, or said no; the
-answer belongs to no sign-in that waits, or proves nothing; the person has no role here,
-or is disabled here; too many sign in at once."""
+"""Reasons why a sign-in at the provider failed.
+
+The provider did not answer, or refused; the answer belongs to no open sign-in, or its
+proof is wrong; the person has no role here, or is disabled; too many sign in at once.
+"""
 
 _RANKS: Final[tuple[PersonRole, ...]] = ("viewer", "operator", "admin")
 
 
 @dataclass(frozen=True, slots=True)
 class ClaimReading:
-    """Where name and role stand in a provider's claims.
+    """Paths of name and role in the claims of a provider.
 
     A path fits the shapes of the providers (docs/deployment.md, "Single sign-on"):
     ``realm_access.roles`` (Keycloak), ``roles`` or ``groups`` (Entra),
     ``roles[].name`` (lists of objects).
 
     Attributes:
-        roles: Value of a claim → the role that it gives.
+        role_claim: Path of the role.
+        name_claim: Path of the name.
+        roles: Value of the claim → role.
     """
 
     role_claim: str
@@ -294,12 +310,12 @@ class ClaimReading:
     roles: Mapping[str, PersonRole]
 
     def read(self, issuer: str, subject: str, claims: Json) -> Account:
-        """The account of the person whom claims are about, with the highest role.
+        """The account of the person in the claims, with the highest role.
 
         Args:
-            issuer: Makes the claims.
-            subject: Id of the person there.
-            claims: What is told; of it nothing but strings counts.
+            issuer: Issuer of the claims.
+            subject: Id of the person at the issuer.
+            claims: The claims, of which only strings count.
 
         Raises:
             SignOnError: the claims give no role.
@@ -307,8 +323,8 @@ class ClaimReading:
         person = person_id(issuer, subject)
         claimed = next(values_at(claims, self.name_claim), "")
         values = values_at(claims, self.role_claim)
-        given = {self.roles[value] for value in values if value in self.roles}
-        role = max(given, key=_RANKS.index, default=None)
+        roles = {self.roles[value] for value in values if value in self.roles}
+        role = max(roles, key=_RANKS.index, default=None)
         name = name_of(claimed, person)
         if role is None:
             raise SignOnError("no_role", f"no value of the claim gives one to {name}")
@@ -316,22 +332,21 @@ class ClaimReading:
 
 
 def person_id(issuer: str, subject: str) -> str:
-    """Id of a person of a provider: neither their name nor the provider's address."""
-    digest = hashlib.sha256(f"{issuer}\0{subject}".encode()).hexdigest()
-    return f"sso-{digest[:32]}"
+    """Id of a person at a provider; it shows neither name nor address."""
+    return "sso-" + digest_of(f"{issuer}\0{subject}")[:32]
 
 
 def name_of(claim: str, person: str) -> str:
-    """A name that somebody may have, close to what is told; else part of the id."""
-    kept = unicodedata.normalize("NFC", claim[: 4 * MOST_NAME])
-    kept = "".join(
-        character for character in kept if is_name(f"x{character}x")
-    ).strip()[:MOST_NAME]
-    return kept if is_name(kept := kept.strip()) else person[:12]
+    """The claimed name, without refused characters; else a part of the id."""
+    text = unicodedata.normalize("NFC", claim[: 4 * MOST_NAME])
+    # Between letters, since a blank alone or at an end is no name.
+    allowed = "".join(character for character in text if is_name(f"x{character}x"))
+    name = allowed.strip()[:MOST_NAME].strip()
+    return name if is_name(name) else person[:12]
 
 
 def another_name(name: str, person: str) -> str:
-    """The name of somebody whose own is taken: with a part of the id behind it."""
+    """A name that is taken, with a part of the id behind it."""
     mark = f" {person.removeprefix('sso-')[:6]}"
     return f"{name[: MOST_NAME - len(mark)].rstrip()}{mark}"
 
@@ -350,7 +365,7 @@ def values_at(claims: Json, path: str) -> Iterator[str]:
 def _walk(value: object, path: tuple[str, ...]) -> Iterator[str]:
     if isinstance(value, list):
         for part in value:
-            # Of a list inside a list nothing is read: no provider has one.
+            # A list inside a list is not read: no provider has one.
             if not isinstance(part, list):
                 yield from _walk(part, path)
     elif path and isinstance(value, dict):

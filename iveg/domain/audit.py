@@ -9,9 +9,9 @@ class Actor:
     """A person, a program, or iVeg itself, as known at the moment of an act.
 
     Attributes:
-        name: For the record and the page; opaque to robots.
-        person: Id of the account; names may change and be given anew.
-        method: Proof of the identity.
+        name: Shown on pages and stored; opaque to robots.
+        person: Id of the account, as a name may change or pass to somebody else.
+        method: Way of signing in.
     """
 
     name: str
@@ -21,8 +21,8 @@ class Actor:
 
 
 ITSELF: Final = Actor("iVeg", "system", "iveg")
-"""Actor of acts that nobody asked for, such as retention."""
+"""Actor of acts of iVeg itself, such as retention."""
 STRANGER: Final = Actor("", "stranger")
-"""Actor of a sign-in that was refused."""
+"""Actor of a refused sign-in."""
 CONSOLE: Final = Actor("console", "system", "console", "shell")
-"""Actor of ``iveg`` on the machine itself."""
+"""Actor of commands in a shell of the machine."""

@@ -1,10 +1,10 @@
 """Delay of a robot's messages, estimated from its clock (docs/safety.md, "Age").
 
-A stamp says how long a message travelled, relative to the fastest one of the same boot,
-kind and transport within a minute (the minimum filter of NTP).  A constant delay and a
-wrong clock look alike from one side, so this is an estimate.  It serves robots that do
-not echo, and the display of the offset.  Moments are iVeg's monotonic clock, which
-nobody sets.
+A stamp gives the delay of a message relative to the fastest one of the same boot, kind
+and transport within a minute (the minimum filter of NTP).  A constant delay and a wrong
+clock look alike, so this is an estimate.  It is used for robots that do not echo, and
+for the display of the offset.  Moments are on iVeg's monotonic clock, which nobody
+sets.
 """
 
 from collections import deque
@@ -17,7 +17,7 @@ from iveg.domain.transports import FIWARE, TransportId
 
 _BUCKET_S, _BUCKETS = 5.0, 12
 STEP_S = 0.5
-"""A clock that leaps by less is corrected within a minute, unnoticed."""
+"""Least leap of a clock that is noticed; a smaller leap fades within a minute (s)."""
 
 Kind = type
 
@@ -26,10 +26,14 @@ Kind = type
 class ClockFilter:
     """The fastest message of the last minute, of one transport, boot and kind.
 
-    A delay lets no stamp fall: a slow transport is never taken for a clock that was
-    set.  It was where stamps fall while seq rises, or a message beats the fastest by
-    more than half a second.  That message is of unknown age, and the filter begins anew
-    with it.
+    No delay lets a stamp fall, so a slow transport never looks like a clock that was
+    set.  A clock was set if stamps fall while seq rises, or if a message beats the
+    fastest by more than half a second.  The age of that message is unknown, and the
+    filter begins anew with it.
+
+    Attributes:
+        least: Arrival less stamp of the fastest message (s); None before the first.
+        newest: Likewise of the newest message.
     """
 
     _buckets: deque[tuple[float, float]] = field(
@@ -39,16 +43,14 @@ class ClockFilter:
     _stamp_s: float = float("-inf")
     seen_at: float = float("-inf")
     least: float | None = None
-    """Arrival less stamp of the fastest message (s); None before the first."""
     newest: float | None = None
-    """Arrival less stamp of the newest message (s)."""
 
     def observe(self, origin: Origin, now: float) -> float | None:
-        """Take one message in.
+        """Take one message.
 
         Returns:
-            Time that it took beyond the fastest one (s), 0 without a stamp; None where
-            nobody can say, because its clock was set.
+            Delay beyond that of the fastest message (s), 0 without a stamp; None:
+            unknown, since the clock was set.
         """
         if origin.stamp_s is None:
             return 0.0
@@ -78,11 +80,12 @@ class ClockFilter:
 
 
 _DIRECT_FRESH_S = 10.0
-_HEARD_S = 2.0
-"""Orion may be told to send one pose a second."""
+"""Time after a direct message in which it is compared with (s)."""
+_ODOMETRY_FRESH_S = 2.0
+"""Time in which odometry is recent: Orion may send one pose a second (s)."""
 _TOLERANCE_S = 0.25
 _APART_S = 2.0
-"""For so long a detector has to be apart before its clock is accused."""
+"""Time apart after which the clock of a detector is accused (s)."""
 OFFSET_WARN_S, _WARNED_S = 0.25, 60.0
 _MAX_FILTERS = 32
 
@@ -92,22 +95,23 @@ _Stream = tuple[TransportId, str | None, Kind]
 
 @dataclass(slots=True)
 class RobotClock:
-    """All that is estimated of one robot's clock: a filter for each stream.
+    """Estimate of one robot's clock, with a filter for each stream.
 
     A detector may stamp by a clock of its own (simulation time, another zone).  Its
-    frames are compared with the odometry that came last: farther apart than any frame
-    protects, they are of another clock, and their age is unknown.
+    frames are compared with the newest odometry.  If they are farther apart than a
+    frame protects, they are of another clock, and their age is unknown.
 
     Attributes:
-        detector_apart_at: When a detection frame was last stamped by another clock than
+        detector_apart_at: Last detection frame that was stamped by another clock than
             odometry (monotonic, s).
-        detector_accused_at: When it last had been so for two seconds.
+        detector_accused_at: Last time at which that had gone on for two seconds
+            (monotonic, s).
+        _apart: Begin of the frames that are apart (monotonic, s), and by how much (s).
     """
 
     detector_apart_at: float | None = None
     detector_accused_at: float | None = None
     _apart: tuple[float, float] | None = None
-    """Since when frames are apart, and by what (s)."""
     _filters: dict[_Stream, ClockFilter] = field(default_factory=dict)
     _warned: tuple[float, float] = (float("-inf"), 0.0)
 
@@ -119,16 +123,16 @@ class RobotClock:
         transport: TransportId,
         lag: float | None,
     ) -> float | None:
-        """Age of a message when it arrived (s), estimated; None: unknown.
+        """Estimated age of a message on arrival (s); None: unknown.
 
-        ``lag`` (s) is that of iVeg's own probe through FIWARE, None before one came
-        back: what FIWARE alone brings is never younger.
+        ``lag``: Lag of iVeg's own probe through FIWARE (s), None before the first came
+        back.  A message that came only through FIWARE is never younger.
         """
         own = self._filter((transport, origin.boot, kind)).observe(origin, at.mono)
         if kind is DetectionFrame:
             beyond = self._beyond_odometry(transport, origin, at.mono)
             if beyond is None:
-                if self._hears_odometry(transport, origin, at.mono):
+                if self._has_odometry(transport, origin, at.mono):
                     self._note_apart(origin, at.mono)
                 return None
             self._apart = None
@@ -142,6 +146,7 @@ class RobotClock:
 
     def _filter(self, stream: _Stream) -> ClockFilter:
         """The filter of a stream; the oldest gives way to a new one."""
+        # Bounded, since any sender can name new boots.
         if stream not in self._filters:
             while len(self._filters) >= _MAX_FILTERS:
                 del self._filters[next(iter(self._filters))]
@@ -153,7 +158,7 @@ class RobotClock:
     ) -> float | None:
         """Delay of a detection frame beyond the fastest odometry (s), 0 if unknown.
 
-        None where it is stamped by another clock.
+        None: it is stamped by another clock.
         """
         odometry = self._filters.get((transport, origin.boot, Odometry))
         if odometry is None or odometry.newest is None or origin.stamp_s is None:
@@ -168,7 +173,7 @@ class RobotClock:
     def _note_apart(self, origin: Origin, now: float) -> None:
         """Note a frame of another clock, unless it is of a backlog.
 
-        A backlog is worked off: its frames are less late from one to the next.
+        The frames of a backlog are less late from one to the next.
         """
         assert origin.stamp_s is not None  # noqa: S101 - else nothing is apart
         self.detector_apart_at, transit = now, now - origin.stamp_s
@@ -177,24 +182,22 @@ class RobotClock:
         elif now - self._apart[0] >= _APART_S:
             self.detector_accused_at = now
 
-    def _hears_odometry(
-        self, transport: TransportId, origin: Origin, now: float
-    ) -> bool:
-        """Whether odometry came just before, by the same way.
+    def _has_odometry(self, transport: TransportId, origin: Origin, now: float) -> bool:
+        """Whether odometry came just before, by the same transport.
 
-        The first frame behind a gap is as late as the gap was long, and nothing tells
-        that from another clock until odometry has passed it, too.
+        The first frame after a gap is as late as the gap was long.  Only odometry that
+        came after the gap as well shows that this is no other clock.
         """
         odometry = self._filters[transport, origin.boot, Odometry]
-        return now - odometry.seen_at <= _HEARD_S
+        return now - odometry.seen_at <= _ODOMETRY_FRESH_S
 
     def _against_direct(self, origin: Origin, now: float) -> float | None:
-        """The delay against the fastest direct message, while there are such (s)."""
+        """Delay beyond the fastest direct message (s); None: there is no recent one."""
         direct = self._newest_direct(lambda boot: boot == origin.boot)
         if direct is None or origin.stamp_s is None or direct.least is None:
             return None
         beyond = now - origin.stamp_s - direct.least
-        # Faster than the fastest direct one: the clock was set in between.
+        # FIWARE cannot be faster than the direct way: the clock was set in between.
         if now - direct.seen_at > _DIRECT_FRESH_S or beyond < -_TOLERANCE_S:
             return None
         return max(0.0, beyond)
@@ -202,13 +205,13 @@ class RobotClock:
     def _newest_direct(
         self, is_wanted: Callable[[str | None], bool]
     ) -> ClockFilter | None:
-        """The filter, of wanted boots, that a message past FIWARE came to last."""
+        """The filter of the newest direct message of a wanted boot."""
         direct = (
-            one
-            for (transport, boot, kind), one in self._filters.items()
+            stream
+            for (transport, boot, kind), stream in self._filters.items()
             if transport != FIWARE.id and kind is not DetectionFrame and is_wanted(boot)
         )
-        return max(direct, key=lambda one: one.seen_at, default=None)
+        return max(direct, key=lambda stream: stream.seen_at, default=None)
 
     def offset_s(self, now: Instant) -> float | None:
         """Lag of the robot's clock behind ours (s), by direct messages alone."""
@@ -218,10 +221,10 @@ class RobotClock:
         return newest.least + now.wall - now.mono
 
     def warning(self, now: Instant, late_s: float = 0.0) -> float | None:
-        """The offset to warn of (s); a warning lasts a minute, so that none flaps.
+        """The offset to warn of (s); None: none.
 
-        A clock that seems behind by no more than messages may be late (``late_s``) is
-        not reported.
+        A warning lasts for a minute, so that it does not flap.  A clock that seems
+        behind by at most ``late_s``, the delay of messages, is not reported.
         """
         offset = self.offset_s(now)
         if (

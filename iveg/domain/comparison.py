@@ -1,4 +1,4 @@
-"""A candidate version of the rule beside the one in force: what each did."""
+"""Comparison of a candidate version of the rule with the version in force."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,8 +9,8 @@ class Doings:
     """Deeds of one version over a range.
 
     Attributes:
-        slowed_s: Reason → seconds of a robot at half speed.
-        encounters: Reason → how often a robot was slowed.
+        slowed_s: Reason → time of robots at half speed (s).
+        encounters: Reason → number of times that a robot was slowed.
     """
 
     slowed_s: Mapping[str, float] = field(default_factory=dict)
@@ -22,11 +22,14 @@ class Comparison:
     """Both versions over the same range and the same inputs.
 
     Attributes:
-        since: Begin of the range (Unix s); ``until`` its end.
-        against: The version that was in force.
-        compared_s: Time in it that was compared (s): less where iVeg did not run.
-        would_slow: How often the candidate would have slowed a robot that drove on.
-        would_not: How often it would not have slowed one that was slowed.
+        since: Begin of the range (Unix s).
+        until: End of the range (Unix s).
+        against: Number of the version that was in force.
+        compared_s: Compared time in the range (s): less if iVeg did not run.
+        in_force: Deeds of the version in force.
+        candidate: Deeds of the candidate.
+        would_slow: Number of times that only the candidate would have slowed a robot.
+        would_not: Number of times that only the version in force slowed a robot.
     """
 
     since: float

@@ -1,13 +1,13 @@
-"""The shared costmap: obstacles that lasers found, with the zones of people laid over.
+"""Shared costmap: obstacles of the lasers, with the zones of people laid over.
 
 Every scan judges each cell in its reach, free or taken (Moravec and Elfes' occupancy
 grid, in log-odds with the clamps of OctoMap, so that a crate that is carried away is
 soon forgotten).  Cells that no beam reaches any more fade to unknown.  People and peers
 are laid over the grid with their zone at the moment of the request.
 
-A ``Grid`` says where the cells lie, a ``Sweep`` what one scan says of those in its
-reach: a cell is free if the beam in that direction went further, taken if it ended
-there.  Left out: beams are lines without width.
+A ``Grid`` places the cells, and a ``Sweep`` is the evidence of one scan for those in
+its reach: a cell is free if the beam in its direction went further, taken if the beam
+ended there.  Simplification: a beam is a line without width.
 """
 
 import math
@@ -23,14 +23,14 @@ from iveg.domain.rule.zones import Zone
 
 RESOLUTION_M = 0.1
 MAX_CELLS = 400_000
-"""A larger greenhouse gets coarser cells, so that none costs more than this."""
+"""Number of cells beyond which a greenhouse gets coarser cells, to bound the work."""
 Numbers = NDArray[np.float32]
 Cells = tuple[slice, slice]
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Where the cells lie in ``map``; row 0 is the southernmost.
+    """Place of the cells in ``map``; row 0 is the southernmost.
 
     Attributes:
         resolution: Side of a cell (m).
@@ -46,16 +46,17 @@ class Grid:
 
     @classmethod
     def over(cls, area: Rectangle) -> "Grid":
-        """The grid that covers an area with at most ``MAX_CELLS``."""
+        """Grid over an area, with at most ``MAX_CELLS``."""
         wide, high = area.xmax - area.xmin, area.ymax - area.ymin
         coarse = math.ceil(math.sqrt(wide * high / MAX_CELLS) / RESOLUTION_M)
         side = RESOLUTION_M * max(1, coarse)
+        # The epsilon keeps the last cell: 0.3 / 0.1 is 2.999... in floats.
         width, height = (max(1, math.floor(s / side + 1e-9)) for s in (wide, high))
         return cls(side, area.xmin, area.ymin, width, height)
 
     @property
     def area(self) -> Rectangle:
-        """All cells together, in ``map``."""
+        """Area of all cells, in ``map`` (m)."""
         east = self.xmin + self.width * self.resolution
         north = self.ymin + self.height * self.resolution
         return Rectangle(self.xmin, self.ymin, east, north)
@@ -77,7 +78,7 @@ class Grid:
         )
 
     def offsets(self, cells: Cells, x: float, y: float) -> tuple[Numbers, Numbers]:
-        """From a point to the centres of cells: dx shape (1, n), dy (m, 1), (m)."""
+        """Offsets of cell centres from a point (m): dx, shape (1, n); dy, (m, 1)."""
         rows, columns = cells
         across = np.arange(columns.start, columns.stop, dtype=np.float32)
         up = np.arange(rows.start, rows.stop, dtype=np.float32)
@@ -87,7 +88,7 @@ class Grid:
 
 
 def overlap(start: int, size: int, limit: int) -> slice:
-    """Where ``size`` cells from ``start`` on meet the cells 0 to ``limit``."""
+    """Part of ``size`` cells from ``start`` on that lies within 0 to ``limit``."""
     low = min(max(start, 0), limit)
     return slice(low, max(low, min(start + size, limit)))
 
@@ -96,9 +97,9 @@ _WINDOW_M, _WINDOW_MARGIN_M, _WINDOW_EDGE_M = 60.0, 20.0, 8.0
 
 
 def window_round(poses: Sequence[Pose2D], before: Grid | None) -> Grid | None:
-    """The area to map when there are no walls: around the robots, at most 60 m wide.
+    """Grid around the robots where no walls are known, at most 60 m wide.
 
-    The window stays in place while every robot is well inside; None without robots.
+    It stays in place while every robot is well inside; ``before`` without robots.
     """
     x, y = [pose.x for pose in poses], [pose.y for pose in poses]
     if not x:
@@ -115,23 +116,24 @@ def window_round(poses: Sequence[Pose2D], before: Grid | None) -> Grid | None:
 
 
 def _stretch(low: float, high: float) -> tuple[float, float]:
-    """One side of the window (m), on whole metres so that cells meet cells."""
+    """Bounds of the window along one axis (m), on whole metres so that cells meet."""
     half = min(_WINDOW_M, high - low + 2 * _WINDOW_MARGIN_M) / 2
     middle, half = round((low + high) / 2), math.ceil(half)
     return middle - half, middle + half
 
 
+# OctoMap's log-odds of a hit and a miss (Hornung et al., 2013).
 _HIT, _MISS = 0.85, -0.4
 _REACH_M = 15.0
 
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """The evidence of one scan for the cells in its reach.
+    """Evidence of one scan for the cells in its reach.
 
     Attributes:
-        cells: Rows and columns that it speaks of.
-        change: Shape of ``cells``; log-odds to add.
+        cells: Rows and columns in reach.
+        change: Log-odds to add, in the shape of ``cells``.
     """
 
     cells: Cells
@@ -141,12 +143,12 @@ class Sweep:
 def sweep_of(
     scan: LaserScan, pose: Pose2D, grid: Grid, returns: Numbers | None = None
 ) -> Sweep:
-    """Read one scan, taken at ``pose`` in ``map``, cell by cell.
+    """Evidence of one scan, taken at ``pose`` in ``map``.
 
-    Each cell looks up its beam, rather than each beam its cells, so that no holes
-    remain between beams that are far apart.  ``returns``, shape (m, 2), (m): where
-    beams ended in ``map``, where that is not in their middle.
+    ``returns``: ends of the beams in ``map`` (m), shape (m, 2), where they are not in
+    the middle of their beams.
     """
+    # Each cell looks up its beam, so wide beams leave no holes between them.
     sensor = pose.compose(scan.mount)
     reach = min(scan.range_max, _REACH_M)
     cells = grid.window(sensor.x, sensor.y, reach)
@@ -160,6 +162,7 @@ def sweep_of(
     rows, columns = cells
     hit = _hits(points, sensor, grid, reach) - (rows.start, columns.start)
     hit = hit[((hit >= 0) & (hit < change.shape)).all(axis=1)]
+    # Hits are written last: a cell with a return is taken, whatever passed through it.
     change[hit[:, 0], hit[:, 1]] = _HIT
     return Sweep(cells, change)
 
@@ -168,8 +171,8 @@ def _free_to(scan: LaserScan, yaw: float, bearing: Numbers, reach: float) -> Num
     """Length of the beam towards each cell (m); 0 where there is no beam."""
     step, first = scan.angle_increment, yaw + scan.angle_min
     turn = math.tau / abs(step)
-    # A scan may turn either way.  Beams are counted from a bearing that no cell is
-    # before, in the scan's own direction, and then less than two turns.
+    # A scan may turn either way.  Beams are counted in the scan's own direction from a
+    # bearing before all cells, so an index is less than two turns.
     side = math.copysign(math.pi, step)
     whole = math.copysign(math.tau, step)
     first -= whole * math.ceil((first + side) / whole)
@@ -180,11 +183,11 @@ def _free_to(scan: LaserScan, yaw: float, bearing: Numbers, reach: float) -> Num
 
 
 def _lengths(scan: LaserScan, size: int, reach: float) -> Numbers:
-    """Length of each beam of a turn (m); 0 where there is none, or no use in it."""
+    """Length of each beam of a turn (m); 0 where there is none or it says nothing."""
     ranges, count = scan.ranges, scan.ranges.size
     went = np.where(scan.speaks(), np.minimum(ranges, reach), 0.0).astype(np.float32)
     if abs(count * scan.angle_increment) >= math.tau - 1.5 * abs(scan.angle_increment):
-        return np.resize(went, size)  # all round: after the last comes the first
+        return np.resize(went, size)  # a full turn: after the last beam the first
     lengths = np.zeros(size, np.float32)
     lengths[: min(count, size)] = went[:size]
     return lengths
@@ -201,19 +204,20 @@ def _hits(
 
 
 UNKNOWN = -1
+# OctoMap's clamps: evidence beyond them would outlast a crate that is carried away.
 _LEAST, _MOST = -2.0, 3.5
 _HALF_LIFE_S, _FADES_EVERY_S = 20.0, 0.25
 _KNOWN = 0.05
-"""Log-odds nearer to zero than this say nothing."""
+"""Log-odds below which a cell counts as unknown, taken or free."""
 _ZONE_EDGE, _ZONE_CENTRE = 50, 99
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InflatedGrid:
-    """Costs at one moment: ``nav_msgs/OccupancyGrid`` with its zones inflated.
+    """Costs at one moment, as ``nav_msgs/OccupancyGrid``, with zones laid over.
 
     Attributes:
-        data: Shape (height, width), int8; 0 free to 100 taken, -1 unknown.
+        data: Costs, shape (height, width): 0 free to 100 taken, -1 unknown.
     """
 
     grid: Grid
@@ -221,10 +225,10 @@ class InflatedGrid:
 
 
 class Occupancy:
-    """Log-odds of one grid: 0 unknown, below free, above taken.
+    """Log-odds of the cells of a grid: 0 unknown, below free, above taken.
 
     Args:
-        half_life_s: In so long half of what is known is forgotten (s).
+        half_life_s: Time in which log-odds fall to a half (s).
     """
 
     def __init__(self, grid: Grid, half_life_s: float = _HALF_LIFE_S) -> None:
@@ -234,22 +238,23 @@ class Occupancy:
         self._faded: float | None = None
 
     def add(self, sweep: Sweep) -> None:
-        """Take one scan in."""
+        """Add the evidence of one scan."""
         part = self._log[sweep.cells]
         part += sweep.change
         np.clip(part, _LEAST, _MOST, out=part)
 
     def fade(self, mono: float) -> None:
-        """Let what is known age until ``mono`` (s), or almost."""
+        """Age the log-odds until ``mono`` (s), in steps of at least 0.25 s."""
+        # Fading touches every cell, so it is not done for each scan.
         if self._faded is not None:
-            passed = max(0.0, mono - self._faded)
-            if passed < _FADES_EVERY_S:
+            elapsed_s = max(0.0, mono - self._faded)
+            if elapsed_s < _FADES_EVERY_S:
                 return
-            self._log *= np.float32(0.5 ** (passed / self._half_life_s))
+            self._log *= np.float32(0.5 ** (elapsed_s / self._half_life_s))
         self._faded = mono
 
     def moved_to(self, grid: Grid) -> "Occupancy":
-        """A copy on a grid of the same resolution that lies elsewhere."""
+        """Copy on another grid of the same resolution."""
         other = Occupancy(grid, self._half_life_s)
         other._faded = self._faded
         old = self.grid
@@ -264,7 +269,7 @@ class Occupancy:
         return other
 
     def costs(self, zones: Iterable[Zone] = ()) -> InflatedGrid:
-        """Cost of each cell, zones of people and peers laid over it."""
+        """Cost of each cell, with zones of people and peers laid over."""
         cost = np.clip(self._log * (100.0 / _MOST), 0.0, 100.0).astype(np.int8)
         cost[np.abs(self._log) < _KNOWN] = UNKNOWN
         for zone in zones:

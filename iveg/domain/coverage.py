@@ -1,7 +1,7 @@
-"""Camera coverage: when a camera last saw each cell of the aisles.
+"""Camera coverage: time since a camera last saw each cell of the aisles.
 
-A map without people says something only of cells that were in view.  Aisles are divided
-into cells; a cell counts as seen when a live robot's camera would have seen a whole
+A map without people is evidence only for cells that were in view.  Aisles are divided
+into cells.  A cell counts as seen when a live robot's camera would have seen a whole
 person in its middle, with nothing in between (``sight.visible_from``).  The same view
 may end a zone.  Recorded robots do not count.
 """
@@ -9,6 +9,7 @@ may end a zone.  Recorded robots do not count.
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,19 +21,19 @@ from iveg.domain.tracking.sight import visible_from
 
 CELL_M = 1.0
 MOST_CELLS = 4000
-"""A larger greenhouse gets coarser cells, so that none costs more than this."""
+"""Number of cells beyond which a greenhouse gets coarser cells, to bound the work."""
 RECENT_S = 10.0
-"""A younger view counts as seen now: a zone lasts as long."""
+"""Age below which a view counts as present (s): the time that a zone lasts."""
 
 _Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
 class LaneCells:
-    """One aisle in equal cells, rows from the south, each from west to east.
+    """Equal cells of one aisle: rows from the south, each from west to east.
 
     Attributes:
-        columns: Cells from west to east; ``rows`` from south to north.
+        columns: Number of cells from west to east; ``rows``: from south to north.
     """
 
     lane: DriveLane
@@ -53,35 +54,32 @@ class LaneCells:
 
 
 class AisleCoverage:
-    """Remembers when each cell of a greenhouse was last in view."""
+    """Time at which each cell of a greenhouse was last in view."""
 
     def __init__(self, greenhouse: Greenhouse) -> None:
         self._greenhouse = greenhouse
         self.lanes = _laid_out(greenhouse.lanes)
-        parts = [one.centres() for one in self.lanes]
+        parts = [lane.centres() for lane in self.lanes]
         self._centres = np.concatenate(parts) if parts else np.empty((0, 2))
         self._looked_at = np.full(len(self._centres), -np.inf)
 
     def update(self, robots: Iterable[RobotState], now: Instant) -> None:
-        """Take in what the cameras of these robots look at now."""
+        """Take the present views of these robots' cameras."""
         for robot in robots:
             seen = visible_from(robot, self._centres, self._greenhouse, now)
             self._looked_at[seen] = now.mono
 
     def ages(self, now: Instant) -> list[list[int | None]]:
-        """Whole seconds since each cell was looked at, per lane; None: never."""
-        ages = [
+        """Age of the newest view of each cell (whole s), by lane; None: never seen."""
+        ages = (
             None if math.isinf(age) else max(0, int(age))
             for age in now.mono - self._looked_at
-        ]
-        lanes, start = [], 0
-        for one in self.lanes:
-            lanes.append(ages[start : start + one.count])
-            start += one.count
-        return lanes
+        )
+        # Cells of all lanes are in a single array, lane after lane.
+        return [list(islice(ages, lane.count)) for lane in self.lanes]
 
     def share(self, now: Instant) -> float | None:
-        """Share of the aisles covered lately (0-1); None without aisles."""
+        """Share of the cells seen within ``RECENT_S`` (0 to 1); None without aisles."""
         if not len(self._looked_at):
             return None
         return float(np.mean(now.mono - self._looked_at <= RECENT_S))

@@ -1,7 +1,7 @@
-"""The evening sheet: one day of the fleet in a few numbers, from the history alone.
+"""Evening sheet: one day of the fleet in a few numbers, from the history alone.
 
-Poses are means over a second, so the distance of a pass is exact to about half a metre,
-the way that a person and a robot move within that second.
+Poses are means over a second.  A person and a robot move within that second, so the
+distance of a pass is exact to about half a metre.
 """
 
 from collections import defaultdict
@@ -15,12 +15,12 @@ from iveg.domain.records import DecisionRecord
 
 PASSES_SHOWN = 3
 _APART_S = 60.0
-"""Passes of one robot nearer in time than this are one."""
+"""Time within which passes of a robot count as the same pass (s)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Pose of a robot in one second, and its speed (m/s)."""
+    """Mean position (``map``, m) and speed (m/s) of a robot in a second (Unix s)."""
 
     robot_id: str
     second: int
@@ -31,7 +31,7 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class DaySighting:
-    """Position of a person in one second."""
+    """Mean position of a person (``map``, m) in a second (Unix s)."""
 
     second: int
     x: float
@@ -43,9 +43,10 @@ class Passing:
     """A robot near a person.
 
     Attributes:
-        distance_m: Between the middles of both.
-        speed: The robot's (m/s).
-        lane: Aisle of the person.
+        at: Time of the pass (Unix s).
+        distance_m: Distance between the middles of both (m).
+        speed: Speed of the robot (m/s).
+        lane: Label of the person's aisle; None: in none.
     """
 
     at: float
@@ -60,7 +61,7 @@ class EncounterCounts:
     """Number of times that a robot came to the zone of a person.
 
     Attributes:
-        slowed: Those of which the robot itself said that it was slow.
+        slowed: Number of encounters in which the robot reported a slow factor.
     """
 
     count: int = 0
@@ -68,15 +69,19 @@ class EncounterCounts:
 
 
 def encounter_counts(decisions: Iterable[DecisionRecord]) -> EncounterCounts:
-    """The encounters with people among these decisions."""
-    met = [one for one in decisions if one.kind == "mandate" and one.reason == "person"]
-    return EncounterCounts(len(met), sum(one.applied_at is not None for one in met))
+    """Counts of the encounters with people among these decisions."""
+    encounters = [
+        row for row in decisions if row.kind == "mandate" and row.reason == "person"
+    ]
+    return EncounterCounts(
+        len(encounters), sum(row.applied_at is not None for row in encounters)
+    )
 
 
 def worked_minutes(
     poses: Iterable[Pose], greenhouse: Greenhouse
 ) -> dict[str, dict[str, float]]:
-    """Aisle → robot → minutes that it drove there."""
+    """Minutes of driving, by aisle and robot."""
     seconds: dict[str, dict[str, int]] = defaultdict(lambda: defaultdict(int))
     for pose in poses:
         lane = greenhouse.lane_at(pose.x, pose.y)
@@ -92,30 +97,32 @@ def worked_minutes(
 def slowed_minutes(
     decisions: Iterable[DecisionRecord], greenhouse: Greenhouse, until: float
 ) -> dict[tuple[str, str | None], float]:
-    """(cause, aisle of the cause) → minutes of a robot slowed; each counted once.
+    """Minutes of slowed robots, by cause and aisle of the cause.
 
     Args:
-        decisions: Of the day.
-        greenhouse: Its aisles.
-        until: When a slow-down that goes on is cut off (Unix s).
+        decisions: Decisions of the day.
+        greenhouse: Greenhouse with its aisles.
+        until: Time at which a slow-down without an end is cut off (Unix s).
     """
-    spans: dict[tuple[str, str | None, str], list[tuple[float, float]]] = {}
-    for one in decisions:
-        if one.kind != "mandate":
+    spans: dict[tuple[str, str | None, str], list[tuple[float, float]]]
+    spans = defaultdict(list)
+    for row in decisions:
+        if row.kind != "mandate":
             continue
-        known = one.x is not None and one.y is not None
-        lane = greenhouse.lane_at(one.x or 0.0, one.y or 0.0) if known else None
-        key = one.reason or "", lane, one.robot_id
-        end = until if one.ended_at is None else min(one.ended_at, until)
-        spans.setdefault(key, []).append((one.started_at, end))
+        known = row.x is not None and row.y is not None
+        lane = greenhouse.lane_at(row.x or 0.0, row.y or 0.0) if known else None
+        key = row.reason or "", lane, row.robot_id
+        end = until if row.ended_at is None else min(row.ended_at, until)
+        spans[key].append((row.started_at, end))
     minutes: dict[tuple[str, str | None], float] = defaultdict(float)
-    for (reason, lane, _), found in spans.items():
-        minutes[reason, lane] += length(found) / 60.0
+    # Decisions of a robot overlap where several people slow it: a minute counts once.
+    for (reason, lane, _), slowed in spans.items():
+        minutes[reason, lane] += length(slowed) / 60.0
     return dict(minutes)
 
 
 def length(spans: Iterable[tuple[float, float]]) -> float:
-    """Length of the union of these spans (s)."""
+    """Length of the union of spans (s)."""
     total, covered = 0.0, float("-inf")
     for start, end in sorted(spans):
         total += max(0.0, end - max(start, covered))
@@ -124,36 +131,33 @@ def length(spans: Iterable[tuple[float, float]]) -> float:
 
 
 def closest_passes(
-    poses: Sequence[Pose], seen: Iterable[DaySighting], greenhouse: Greenhouse
+    poses: Sequence[Pose], sightings: Iterable[DaySighting], greenhouse: Greenhouse
 ) -> list[Passing]:
     """The closest passes of moving robots near people, nearest first."""
     by_second: dict[int, list[Pose]] = defaultdict(list)
     for pose in poses:
+        # A standing robot passes nobody.
         if abs(pose.speed) >= LIMITS.standing_speed:
             by_second[pose.second].append(pose)
-    near = [
-        _passing(pose, one, greenhouse)
-        for one in seen
-        for pose in by_second[one.second]
+    passes = [
+        Passing(
+            at=float(pose.second),
+            robot_id=pose.robot_id,
+            distance_m=hypot(pose.x - person.x, pose.y - person.y),
+            speed=abs(pose.speed),
+            lane=greenhouse.lane_at(person.x, person.y),
+        )
+        for person in sightings
+        for pose in by_second[person.second]
     ]
-    chosen: list[Passing] = []
-    for one in sorted(near, key=lambda it: it.distance_m):
-        if not any(_is_same(one, other) for other in chosen):
-            chosen.append(one)
-        if len(chosen) == PASSES_SHOWN:
+    closest: list[Passing] = []
+    for passing in sorted(passes, key=lambda passing: passing.distance_m):
+        is_known = any(
+            passing.robot_id == other.robot_id and abs(passing.at - other.at) < _APART_S
+            for other in closest
+        )
+        if not is_known:
+            closest.append(passing)
+        if len(closest) == PASSES_SHOWN:
             break
-    return chosen
-
-
-def _passing(pose: Pose, one: DaySighting, greenhouse: Greenhouse) -> Passing:
-    return Passing(
-        at=float(pose.second),
-        robot_id=pose.robot_id,
-        distance_m=hypot(pose.x - one.x, pose.y - one.y),
-        speed=abs(pose.speed),
-        lane=greenhouse.lane_at(one.x, one.y),
-    )
-
-
-def _is_same(one: Passing, other: Passing) -> bool:
-    return one.robot_id == other.robot_id and abs(one.at - other.at) < _APART_S
+    return closest

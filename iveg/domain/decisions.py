@@ -1,18 +1,18 @@
-"""The decision record: from the detection to the observed slow-down, link by link.
+"""Decisions: each slow-down of a robot, from the detection to its motion, by links.
 
-A ``SlowdownDecision`` opens when a robot enters a zone and closes when it is let go.
-Every link has a time and a verdict; a link that does not come in time raises an alert
-(docs/dashboard.md, "Decisions")::
+A ``SlowdownDecision`` opens when a robot enters a zone and closes when the robot is
+released from the limit.  Every link has a time and a verdict (docs/dashboard.md,
+"Decisions")::
 
     detection ─> filter ─> geometry ─> rule ─> feedback ─> applied ─> observed
 
-A link is ``open`` while it may still come and never for longer: it comes, is missing,
-or iVeg itself is interrupted and its end is ``unknown``.
+A link is ``open`` while it may still come.  Then it has come, is ``missing``, or is
+``unknown`` because iVeg itself was interrupted.
 """
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED
@@ -32,11 +32,12 @@ LinkName = Literal[
 ]
 
 LATE_S, MISSING_S = 1.0, 2.0
+"""Time after the entry from which a link is late, or is waited for no more (s)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """One step of the chain: when, what, and whether it held."""
+    """One step of the chain: verdict, time (Unix s) and value."""
 
     name: LinkName
     verdict: LinkVerdict
@@ -46,7 +47,7 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a robot was when a decision began, in ``map`` (m, rad)."""
+    """Pose of a robot at the start of a decision, in ``map`` (m, rad)."""
 
     robot_id: str
     x: float
@@ -56,15 +57,17 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class SlowdownDecision:
-    """Why one robot was slowed once.
+    """One slow-down of one robot, with its cause and effects.
 
     Attributes:
-        feedback: When the speed limit was first published; ``applied`` when the robot
-            said so; ``observed`` when its motion showed it.
+        feedback: First publication of the speed limit.
+        applied: First report of the robot that it applies the limit.
+        observed: First slow motion of the robot.
+        ended: Release from the limit, or the end of iVeg.
         speed_after: Speed at ``observed`` (m/s).
-        waited_out: Whether every link has come or is missing.
-        interrupted: iVeg went away while it was open; ``ended`` is when that was.
-        places: Where the robot that is slowed and the observer were.
+        waited_out: Whether links that have not come are missing.
+        interrupted: Whether iVeg ended while the decision was open.
+        places: Poses of the slowed robot and the observer at its start.
     """
 
     entry: ZoneEntry
@@ -80,57 +83,28 @@ class SlowdownDecision:
 
     @property
     def decision_id(self) -> str:
-        """Names the decision everywhere: feedback, log, record."""
+        """Id of the decision in feedback, log and record."""
         return self.entry.decision_id
 
-    def published(self, at: Instant) -> "SlowdownDecision":
-        """The speed limit was published."""
-        return self if self.feedback is not None else replace(self, feedback=at)
-
-    def reported(self, report: SafetyReport, at: Instant) -> "SlowdownDecision":
-        """The robot said what it applies."""
-        if self.applied is not None or report.speed_factor > HALF_SPEED:
-            return self
-        return replace(self, applied=at)
-
-    def slowed(self, speed: float, at: Instant) -> "SlowdownDecision":
-        """The robot was measured to be slow, at this speed (m/s)."""
-        if self.observed is not None:
-            return self
-        return replace(self, observed=at, speed_after=speed)
-
-    def closed(self, at: Instant, *, interrupted: bool = False) -> "SlowdownDecision":
-        """The robot was let go, or iVeg stops and the end stays unknown."""
-        return replace(self, ended=at, interrupted=interrupted)
-
-    def aged(self, heard_s: float) -> "SlowdownDecision":
-        """Let time pass; a link that did not come is missing from now on.
-
-        Args:
-            heard_s: How long the robot has been heard since it began, without a silence
-                (s): what nobody could hear is not judged.
-        """
-        if self.waited_out or heard_s < MISSING_S:
-            return self
-        return replace(self, waited_out=True)
-
     def links(self) -> tuple[Link, ...]:
-        """The chain as it stands."""
+        """All links, as known now."""
         entry, rule = self.entry, self.rule
         sighting = entry.zone.sighting
         entered = entry.entered.wall
-        seen = (
+        # A zone without a sighting is that of a peer, which its own odometry places.
+        detection = (
             Link("detection", "n/a", None, "odometry")
             if sighting is None
             else Link("detection", "ok", sighting.at.wall, sighting.class_id)
         )
+        # The filter judges confidence, which a laser track lacks.
         passed = (
             Link("filter", "n/a")
             if sighting is None or sighting.laser
             else Link("filter", "ok", sighting.at.wall, sighting.confidence)
         )
         return (
-            seen,
+            detection,
             passed,
             Link("geometry", "ok", entered, entry.entered_m),
             Link("rule", "ok", entered, f"{rule.id} {rule.version}"),
@@ -145,9 +119,8 @@ class SlowdownDecision:
             yield Link("interrupted", "unknown", self.ended.wall)
 
     def _step(self, name: LinkName, at: Instant | None, value: float | None) -> Link:
-        start = self.entry.entered.mono
         if at is not None:
-            took = at.mono - start
+            took = at.mono - self.entry.entered.mono
             return Link(name, "ok" if took <= LATE_S else "late", at.wall, value)
         if self.waited_out:
             return Link(name, "missing")
@@ -157,9 +130,12 @@ class SlowdownDecision:
 
 
 class Decisions:
-    """Open decisions, and the last few that ended.
+    """Open decisions, and the newest ended ones.
 
-    What happens to the fleet is a method, which returns the decisions that it changed.
+    Each event of the fleet is a method, which returns the decisions that it changed.
+
+    Args:
+        keep: Number of decisions beyond which an ended one is forgotten.
     """
 
     def __init__(self, keep: int = 200) -> None:
@@ -167,18 +143,18 @@ class Decisions:
         self._all: dict[str, SlowdownDecision] = {}
 
     def get(self, decision_id: str) -> SlowdownDecision | None:
-        """One decision that is still in memory."""
+        """A decision by its id; None when it is not in memory."""
         return self._all.get(decision_id)
 
     @property
     def open(self) -> list[SlowdownDecision]:
-        """All open decisions."""
+        """Decisions that have not ended, oldest first."""
         return [decision for decision in self._all.values() if decision.ended is None]
 
     def begin(
         self, entry: ZoneEntry, rule: DetectionRule, places: Iterable[Place] = ()
     ) -> SlowdownDecision:
-        """Open the decision of an entry; the oldest ended ones make room."""
+        """Open the decision of an entry; the oldest ended decision makes room."""
         decision = SlowdownDecision(entry, rule, places=tuple(places))
         self._all[decision.decision_id] = decision
         if len(self._all) > self._keep:
@@ -189,44 +165,48 @@ class Decisions:
         return decision
 
     def end(self, decision_id: str, at: Instant) -> list[SlowdownDecision]:
-        """A robot was let go."""
+        """End a decision: its robot is released from the limit."""
         decision = self._all.get(decision_id)
-        return (
-            []
-            if decision is None
-            else self._change([decision], lambda decision: decision.closed(at))
-        )
+        return self._change([] if decision is None else [decision], ended=at)
 
     def moved(
         self, robot_id: str, speed: float, at: Instant, *, is_slow: bool
     ) -> list[SlowdownDecision]:
-        """A robot drives, at this measured speed (m/s)."""
-        some = self._open_of(robot_id) if is_slow else ()
-        return self._change(some, lambda decision: decision.slowed(speed, at))
+        """Take the measured speed of a robot (m/s)."""
+        known = self._open_of(robot_id) if is_slow else ()
+        waiting = [decision for decision in known if decision.observed is None]
+        return self._change(waiting, observed=at, speed_after=speed)
 
     def reported(self, report: SafetyReport, at: Instant) -> list[SlowdownDecision]:
-        """A robot says what it applies."""
-        some = self._open_of(report.robot_id)
-        return self._change(some, lambda decision: decision.reported(report, at))
+        """Take the applied factor of a robot's report."""
+        is_slow = report.speed_factor <= HALF_SPEED
+        known = self._open_of(report.robot_id) if is_slow else ()
+        waiting = [decision for decision in known if decision.applied is None]
+        return self._change(waiting, applied=at)
 
     def published(self, at: Instant) -> list[SlowdownDecision]:
-        """Feedback was published."""
-        return self._change(self.open, lambda decision: decision.published(at))
+        """Note that feedback was published."""
+        waiting = [decision for decision in self.open if decision.feedback is None]
+        return self._change(waiting, feedback=at)
 
-    def age(self, heard_s: Callable[[ZoneEntry], float]) -> list[SlowdownDecision]:
-        """Time passes.
+    def age(self, linked_s: Callable[[ZoneEntry], float]) -> list[SlowdownDecision]:
+        """Let time pass; links that have not come in time are missing from now on.
 
-        ``heard_s``: how long an entry's robot has been heard since it began (s).
+        Args:
+            linked_s: Time since an entry in which its robot was received without a
+                silence (s).
         """
-        return self._change(
-            self.open, lambda decision: decision.aged(heard_s(decision.entry))
-        )
+        # By time with a link, not by the clock: a silence judges no link.
+        late = [
+            decision
+            for decision in self.open
+            if not decision.waited_out and linked_s(decision.entry) >= MISSING_S
+        ]
+        return self._change(late, waited_out=True)
 
     def break_off(self, at: Instant) -> list[SlowdownDecision]:
-        """End every open one: iVeg stops."""
-        return self._change(
-            self.open, lambda decision: decision.closed(at, interrupted=True)
-        )
+        """End every open decision, as iVeg stops."""
+        return self._change(self.open, ended=at, interrupted=True)
 
     def _open_of(self, robot_id: str) -> list[SlowdownDecision]:
         return [
@@ -234,12 +214,8 @@ class Decisions:
         ]
 
     def _change(
-        self,
-        some: Iterable[SlowdownDecision],
-        step: Callable[[SlowdownDecision], SlowdownDecision],
+        self, decisions: Iterable[SlowdownDecision], **changes: Any
     ) -> list[SlowdownDecision]:
-        changed = [
-            after for decision in some if (after := step(decision)) is not decision
-        ]
+        changed = [replace(decision, **changes) for decision in decisions]
         self._all.update({decision.decision_id: decision for decision in changed})
         return changed

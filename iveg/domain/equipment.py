@@ -35,21 +35,22 @@ _PRIORITY: Mapping[Limit, Priority] = {
     "low": "P3",
     "high": "P3",
 }
-"""The graver first."""
+"""Priority of the alert of each limit; the graver limits first."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tile:
-    """One attribute of one entity, and how people are shown it.
+    """One attribute of one entity, with its display and limits.
 
     Attributes:
-        device: At the IoT Agent, which iVeg provisions; empty: somebody else writes the
-            entity.
-        name: By language, ``es`` and ``en``.
-        limits: By name, in the unit; deadband: how far inside one it has to come back.
-        silent_after_s: Without a value for so long it has no signal (s).
+        name: Its name by language, ``es`` and ``en``.
+        limits: Limits by name, in the unit.
+        deadband: Distance inside a limit at which its alert clears, in the unit.
+        silent_after_s: Age of the newest value from which it has no signal (s).
         has_trend: Whether its last 24 hours are drawn.
-        place: Where its mark stands on the map (m, in ``map``).
+        place: Position of its mark in ``map`` (m).
+        device: Its device at the IoT Agent, which iVeg provisions; empty: another
+            program writes the entity.
     """
 
     entity_id: str
@@ -67,35 +68,35 @@ class Tile:
 
     @property
     def key(self) -> str:
-        """Names the tile; no other has this attribute."""
+        """Id of the tile: entity and attribute, which no other tile has."""
         return f"{self.entity_id}/{self.attribute}"
 
 
 @dataclass(slots=True)
 class TileStatus:
-    """Newest knowledge of one tile.
+    """Newest value of one tile.
 
     Attributes:
         value: The newest number; None before the first.
-        received: When it came.
-        heard_at: When anything came, a number or not (monotonic, s).
+        received: Arrival of that number.
+        updated_at: Arrival of the newest value, a number or not (monotonic, s).
         is_readable: Whether the newest value was a number.
-        beyond: The limit that it is beyond.
+        beyond: Gravest limit that the number is beyond; None: it is within all.
     """
 
     value: float | None = None
     received: Instant | None = None
-    heard_at: float | None = None
+    updated_at: float | None = None
     is_readable: bool = True
     beyond: Limit | None = None
 
 
 class Equipment:
-    """All tiles with what is known of them.
+    """Tiles with their newest values.
 
     Args:
-        tiles: In the order of the file.
-        start: When nothing had been heard yet.
+        tiles: Tiles in the order of the file.
+        start: Start of iVeg; silence before the first value counts from here.
     """
 
     def __init__(self, tiles: Sequence[Tile], start: Instant) -> None:
@@ -109,26 +110,26 @@ class Equipment:
         return frozenset((tile.entity_id, tile.entity_type) for tile in self.tiles)
 
     def status(self, tile: Tile) -> TileStatus:
-        """Newest knowledge of a tile."""
+        """Newest value of a tile."""
         return self._status[tile.key]
 
     def read(
         self, entity_id: str, values: Mapping[str, object], at: Instant
     ) -> list[Tile]:
-        """Take in attributes of an entity; those without a tile are not looked at.
+        """Take attributes of an entity; attributes without a tile are ignored.
 
         Returns:
-            The tiles that have a new number.
+            Tiles with a new number.
         """
         renewed = []
         for tile in self.tiles:
             value = values.get(tile.attribute)
-            # Null is what Orion has of a device that knows no value: nothing was heard.
+            # Orion stores null for a device without a value: nothing was received.
             if tile.entity_id != entity_id or value is None:
                 continue
             status = self._status[tile.key]
             number = _number(value)
-            status.heard_at, status.is_readable = at.mono, number is not None
+            status.updated_at, status.is_readable = at.mono, number is not None
             if number is not None:
                 status.value, status.received = number, at
                 status.beyond = _beyond(tile, number, status.beyond)
@@ -136,12 +137,12 @@ class Equipment:
         return renewed
 
     def state(self, tile: Tile, now: Instant) -> State:
-        """The state of a tile now."""
+        """State of a tile now."""
         status = self._status[tile.key]
-        since = self._start.mono if status.heard_at is None else status.heard_at
+        since = self._start.mono if status.updated_at is None else status.updated_at
         if now.mono - since > tile.silent_after_s:
             return "silent"
-        if status.heard_at is None:
+        if status.updated_at is None:
             return "waiting"
         if not status.is_readable:
             return "unreadable"
@@ -155,21 +156,21 @@ class Equipment:
             slots |= {f"tile_{language}": name for language, name in tile.name.items()}
             if state in ("silent", "unreadable"):
                 slots["minutes"] = round(tile.silent_after_s / 60.0, 1)
-                yield Condition("P3", f"alert.tile_{state}", tile.key, None, slots)
+                yield Condition.filled("P3", f"alert.tile_{state}", tile.key, **slots)
             elif state == beyond and beyond is not None:
-                # The limit and not the value: the sentence stays true while it lasts.
+                # The sentence names the limit: the value would be outdated at once.
                 slots["limit"] = tile.limits[beyond]
                 slots["unit"] = "" if tile.unit == "1" else tile.unit
                 key = f"alert.tile_{'high' if 'high' in beyond else 'low'}"
                 subject = f"{tile.key} {beyond}"
-                yield Condition(_PRIORITY[beyond], key, subject, None, slots)
+                yield Condition.filled(_PRIORITY[beyond], key, subject, **slots)
 
 
 def contradiction(tiles: Sequence[Tile]) -> tuple[int, str, str] | None:
-    """The first tile that cannot be beside those before it; None: all can.
+    """First tile that contradicts an earlier one; None: all agree.
 
     Returns:
-        Its index, the name of what is wrong, and why.
+        Its index, the name of the wrong member, and the reason.
     """
     for index, tile in enumerate(tiles):
         for other in tiles[:index]:
@@ -184,21 +185,21 @@ def contradiction(tiles: Sequence[Tile]) -> tuple[int, str, str] | None:
 
 
 def _number(value: object) -> float | None:
-    """A finite number; None of anything else, truth values and texts among it."""
+    """A finite number; None for anything else, truth values and texts included."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
-    # No gauge reads more, and a whole number may be larger than any float.
+    # No gauge shows more, and a whole number may exceed the range of a float.
     return float(value) if abs(value) < 1e15 and math.isfinite(value) else None
 
 
 def _beyond(tile: Tile, value: float, before: Limit | None) -> Limit | None:
-    """The gravest limit that a value is beyond; one that it was beyond holds longer."""
+    """Gravest limit that a value is beyond; limit ``before`` has a deadband."""
     for name in _PRIORITY:
         limit = tile.limits.get(name)
         if limit is None:
             continue
-        held = tile.deadband if name == before else 0.0
-        over = value - limit if "high" in name else limit - value
-        if over + held > 0.0:
+        deadband = tile.deadband if name == before else 0.0
+        excess = value - limit if "high" in name else limit - value
+        if excess + deadband > 0.0:
             return name
     return None

@@ -1,33 +1,33 @@
-"""The one error tree; ``web/problems`` makes HTTP of it, and adds what only HTTP has.
+"""Error tree; ``web/problems`` turns it into HTTP and adds the errors of HTTP alone.
 
 IvegError
 ├── SettingsError           a setting that cannot be used; stops the start
 ├── DataFileError           a greenhouse, scenario or log file that cannot be used
 ├── MissingExtraError       a library that was not installed; stops the command
 ├── UnreadableError         bytes that the contract does not describe (HTTP 400)
-├── NotAllowedError         somebody without the role (HTTP 403)
+├── NotAllowedError         a caller without the role (HTTP 403)
 ├── UnknownRobotError       a robot id that is not in the fleet (HTTP 404)
-├── UnknownNameError        an id of anything else that is not known (HTTP 404)
-├── NotRecordedError        a moment of which nothing was recorded (HTTP 404)
+├── UnknownNameError        an unknown id of anything else (HTTP 404)
+├── NotRecordedError        a moment without a recording (HTTP 404)
 ├── RefusedError            an act that must not happen now (HTTP 409)
 │   ├── CommandRefusedError     a release, resume or goal
 │   ├── MarkRefusedError        a mark "not a person here"
 │   └── TrialRefusedError       beginning, ending or promoting the trial of a rule
-├── OutdatedError           a change of something that has changed since (HTTP 409)
-├── ProvidedAccountError    a change of what the identity provider says (HTTP 409)
-├── NameTakenError          a name that somebody has already (HTTP 409)
-├── NotANameError           a name that nobody may have
-├── VersionMissingError     a change that does not say of what (HTTP 428)
+├── OutdatedError           a change of an older version (HTTP 409)
+├── ProvidedAccountError    a change that only the identity provider may make (HTTP 409)
+├── NameTakenError          a name that another account has (HTTP 409)
+├── NotANameError           a name that no account may have
+├── VersionMissingError     a change that names no version (HTTP 428)
 ├── BusyError               more sign-ins wait than are served soon (HTTP 429)
-├── SignOnError             a sign-in at the identity provider that let nobody in
+├── SignOnError             a failed sign-in at the identity provider
 ├── VitalPartError          a part that STOP needs has ended; ends the process
 └── HopError                a neighbour that cannot be reached or answered wrongly
-    └── NoAnswerError       one that took the question and did not answer in time
+    └── NoAnswerError       a neighbour that accepted a request and did not answer
 """
 
 
 class IvegError(Exception):
-    """Root of everything that iVeg raises on purpose."""
+    """Root of all errors that iVeg raises on purpose."""
 
 
 class SettingsError(IvegError):
@@ -38,7 +38,7 @@ class SettingsError(IvegError):
 
 
 class DataFileError(IvegError):
-    """A data file cannot be used; says which file, where in it, and why."""
+    """A data file cannot be used; names the file, the place in it and the reason."""
 
     def __init__(self, file: str, where: str, reason: str) -> None:
         place = f"{file}, {where}" if where else file
@@ -56,10 +56,11 @@ class MissingExtraError(IvegError):
 
 
 class UnreadableError(IvegError):
-    """Something arrived that the contract does not describe.
+    """A message or file is not as the contract describes it.
 
     Attributes:
-        reason: A short, stable code to count by, such as ``not_json``.
+        reason: Short, stable code for counters, such as ``not_json``.
+        detail: Cause in words; may be empty.
     """
 
     def __init__(self, reason: str, detail: str = "") -> None:
@@ -73,7 +74,8 @@ class NotRecordedError(IvegError):
 
     Attributes:
         at: The moment (Unix s).
-        before, after: The last and the next recorded moments; None: there is none.
+        before: Newest recorded moment before it (Unix s); None: there is none.
+        after: Oldest recorded moment after it (Unix s); None: there is none.
     """
 
     def __init__(self, at: float, before: float | None, after: float | None) -> None:
@@ -96,9 +98,10 @@ class UnknownNameError(IvegError):
 
 
 class NotANameError(IvegError):
-    """Nobody may be called so."""
+    """No account may have this name."""
 
     def __init__(self, name: str) -> None:
+        # Orion refuses these characters, and the name goes with each STOP.
         rule = (
             "1 to 64 visible characters, none of < > \" ' = ; ( ), and nobody "
             "else's, such as console, program or operator"
@@ -107,7 +110,7 @@ class NotANameError(IvegError):
 
 
 class NameTakenError(IvegError):
-    """Somebody is called so already, or nearly so."""
+    """Another account has this name or one that looks like it."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"Somebody is called {name!r} already.")
@@ -129,7 +132,8 @@ class CommandRefusedError(RefusedError):
     """A release, resume or goal is refused.
 
     Args:
-        why: Code of the reason, and what is told unless a sentence is (``because``).
+        why: Code of the reason.
+        because: Reason in words; None: the code is shown.
     """
 
     def __init__(
@@ -139,7 +143,7 @@ class CommandRefusedError(RefusedError):
 
 
 class MarkRefusedError(RefusedError):
-    """Nothing may be marked as "not a person here" there.
+    """A mark "not a person here" is refused.
 
     ``why`` is ``somebody`` or ``too_many``.
     """
@@ -149,9 +153,9 @@ class MarkRefusedError(RefusedError):
 
 
 class TrialRefusedError(RefusedError):
-    """No trial of a rule may begin, end or be promoted now.
+    """The trial of a rule cannot begin, end or be promoted now.
 
-    ``why`` is ``running`` (another is), ``same`` (as the rule in force) or ``none``.
+    ``why`` is ``running`` (another trial), ``same`` (as the rule in force) or ``none``.
     """
 
     def __init__(self, why: str) -> None:
@@ -159,14 +163,14 @@ class TrialRefusedError(RefusedError):
 
 
 class OutdatedError(IvegError):
-    """Somebody changes what they saw, and it is no longer so."""
+    """A change rests on an older version."""
 
     def __init__(self, what: str, seen: int, now: int) -> None:
         super().__init__(f"{what} is at version {now}; you have seen version {seen}.")
 
 
 class VersionMissingError(IvegError):
-    """Somebody changes what others change, too, and does not say what they saw."""
+    """A change does not name the version that it rests on."""
 
     def __init__(self, what: str) -> None:
         super().__init__(f"{what} is changed by naming the version that was seen.")
@@ -180,17 +184,17 @@ class BusyError(IvegError):
 
 
 class NotAllowedError(IvegError):
-    """The caller is known and may not do this."""
+    """The role of a known caller does not permit the act."""
 
     def __init__(self, action: str, role: str) -> None:
         super().__init__(f"{role} may not {action}.")
 
 
 class SignOnError(IvegError):
-    """A sign-in at the identity provider let nobody in.
+    """A sign-in at the identity provider failed.
 
     Attributes:
-        failure: One of ``SignOnFailure``, for which people are shown a sentence.
+        failure: One of ``SignOnFailure``; each has a sentence on the page.
         detail: For the log and the audit; holds no token.
     """
 
@@ -201,24 +205,24 @@ class SignOnError(IvegError):
 
 
 class ProvidedAccountError(IvegError):
-    """The account is the identity provider's, which alone changes this of it."""
+    """Only the identity provider can change this of its account."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"{name} signs in at the identity provider, as it says.")
 
 
 class VitalPartError(IvegError):
-    """A part without which there is no STOP or no speed limit has ended."""
+    """A part has ended that STOP or speed limits need."""
 
     def __init__(self, part: str) -> None:
         super().__init__(f"{part} has ended, and iVeg with it; robots slow and stand.")
 
 
 class HopError(IvegError):
-    """A neighbour did not do its part.
+    """A neighbour of iVeg failed.
 
     Attributes:
-        hop: Which one: ``mqtt``, ``orion``, ``iot_agent``, ``database``.
+        hop: The neighbour: ``mqtt``, ``orion``, ``iot_agent``, ``database``.
     """
 
     def __init__(self, hop: str, detail: str) -> None:
@@ -228,4 +232,4 @@ class HopError(IvegError):
 
 
 class NoAnswerError(HopError):
-    """A neighbour took the question and did not answer in time: late, or hung."""
+    """A neighbour accepted a request and did not answer in time."""

@@ -1,8 +1,8 @@
-"""Sentences to come: log lines, conditions of alerts, and messages to people elsewhere.
+"""Templates of sentences with their values: log lines, conditions, messages to people.
 
-Each is the name of a template and what fills its holes.  A message outside the page
-says how grave it is and when, never where or about whom: it passes through other
-people's servers (docs/interfaces/http.md, "Messages").
+A message to a person away from the page has a priority and a time.  It never names a
+place or a person, since it passes through other people's servers
+(docs/interfaces/http.md, "Messages").
 """
 
 from collections.abc import Mapping
@@ -18,12 +18,12 @@ Priority = Literal["P1", "P2", "P3"]
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """An address of apprise, under a name that may be logged.
+    """Address of apprise, under a name that may be logged.
 
     Attributes:
-        url: Mostly a secret.
-        least: The least priority that is sent.
-        escalates: Reached only where nobody acknowledges.
+        url: Address with its credentials: a secret.
+        least: Least priority that is sent to it.
+        escalates: Whether it receives only alerts that nobody acknowledges.
     """
 
     name: str
@@ -34,7 +34,7 @@ class Address:
 
 @dataclass(frozen=True, slots=True)
 class MessagePlan:
-    """All addresses outside the page; none at first."""
+    """Addresses of messages; none by default."""
 
     addresses: tuple[Address, ...] = ()
     escalate_after_s: float = 600.0
@@ -43,7 +43,7 @@ class MessagePlan:
 
 @dataclass(frozen=True, slots=True)
 class AlertItem:
-    """One occurrence of an alert, in a message."""
+    """One occurrence of an alert in a message."""
 
     priority: Priority
     raised: Instant
@@ -66,8 +66,8 @@ class LogEvent:
     """One line of the decision and inference log.
 
     Attributes:
-        key: Names the sentence in ``static/i18n``; ``slots`` fill its holes.
-        class_: The canonical class that the line is about, for filters.
+        key: Key of its sentence in ``static/i18n``; ``slots`` fill the placeholders.
+        class_: Canonical class that it is about, for filters.
     """
 
     kind: EventKind
@@ -83,7 +83,8 @@ class Condition:
     """A condition that holds now and asks for an alert.
 
     Attributes:
-        key: Names the sentence; ``subject`` distinguishes two of a kind.
+        key: Key of its sentence.
+        subject: Distinguishes conditions with the same key.
     """
 
     priority: Priority
@@ -93,8 +94,15 @@ class Condition:
     slots: Mapping[str, Slot] = field(default_factory=dict)
 
     @classmethod
+    def filled(
+        cls, priority: Priority, key: str, subject: str, **slots: Slot
+    ) -> "Condition":
+        """Condition without a robot, from the values of its sentence."""
+        return cls(priority, key, subject, None, slots)
+
+    @classmethod
     def of_robot(
         cls, priority: Priority, key: str, robot_id: str, **slots: Slot
     ) -> "Condition":
-        """A condition of one robot, whom its sentence names."""
+        """Condition of one robot, which its sentence names."""
         return cls(priority, key, robot_id, robot_id, {"robot": robot_id, **slots})

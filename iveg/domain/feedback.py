@@ -1,7 +1,7 @@
 """Feedback of iVeg to the fleet (Algorithm 2), evaluated by every robot (Algorithm 3).
 
-One ``Feedback`` goes out for each robot that observes; it carries the alerts that are
-alive and the speed limits of the whole fleet (docs/interfaces/mqtt.md).
+One ``Feedback`` goes out for each robot that observes.  It has the present alerts and
+the speed limits of the whole fleet (docs/interfaces/mqtt.md).
 """
 
 from collections.abc import Mapping
@@ -30,6 +30,7 @@ from iveg.domain.wire import (
 
 FULL_SPEED = 1.0
 LONGEST_BACKLOG_S = 60.0
+"""Greatest backlog of Orion in a feedback (s)."""
 HALF_SPEED = LIMITS.slow_factor
 """The factor inside a zone; a constant of the paper, not a setting."""
 
@@ -47,10 +48,10 @@ class FeedbackAlert:
     """A confirmed person or robot, or (``class_`` None) the stamp of another object.
 
     Attributes:
-        position: In ``map`` (m).
-        radius_m: The zone at ``stamp``, grown with the age of the sighting.
-        velocity: How it goes on in ``map`` (m/s); None: it was not seen for a second,
-            so nobody knows.
+        position: Position in ``map`` (m).
+        radius_m: Radius of the zone at ``stamp``, grown with the age of the sighting.
+        velocity: Velocity in ``map`` (m/s); None: unknown, since it was not seen for a
+            second.
     """
 
     decision_id: Annotated[Text, BeforeValidator(_or_empty), IF_ANY] = ""
@@ -66,17 +67,18 @@ class FeedbackAlert:
 
 @dataclass(frozen=True, slots=True)
 class SpeedLimit:
-    """The speed factor that one robot must keep, and the reason.
+    """The speed factor that one robot must keep, and the reason for it.
 
     Attributes:
         speed_factor: 0, 0.5 or 1.
         reason: ``clear``, ``person``, ``robot``, ``obstacle``, ``stale``, ``doubt``
             or ``unsupervised``.
-        cause: The person or robot that it is for; None of what only a laser sees.
-        distance_m: From ``base_link`` to the centre of the cause (m).
-        foretold_s: When it will reach the zone of the cause (s); None: it is inside.
-        over: Its reason has ended: it is lifted a second after that, and so is what the
-            robot judges itself.
+        cause: The person or robot that is the cause; None: only a laser sees it.
+        distance_m: Distance from ``base_link`` to the centre of the cause (m).
+        decision_id: Decision that the limit follows; None: it follows none.
+        foretold_s: Time until it reaches the zone of the cause (s); None: it is inside.
+        over: Whether its reason has ended: a second later the limit is lifted, and with
+            it the robot's own.
     """
 
     speed_factor: Annotated[float, Strict(), Field(ge=0, le=1)]
@@ -90,7 +92,7 @@ class SpeedLimit:
 
 CLEAR = SpeedLimit(FULL_SPEED)
 UNSUPERVISED = SpeedLimit(HALF_SPEED, "unsupervised")
-"""Of a robot that nobody has judged, or that a feedback does not name."""
+"""Limit of a robot that was not judged yet, or that a feedback does not name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,15 +101,15 @@ class Feedback:
 
     Attributes:
         robot_id: The observer that this topic belongs to.
-        alert: The newest; None without one.
-        alerts: All that are alive.
-        pose: Where iVeg believes the observer to be; None when unknown.
-        speed_limits: Of every robot that is judged, clear ones included.
-        seen: Newest safety-report ``seq`` that iVeg has of each robot.
-        backlog_s: How far Orion is behind (s), at most ``LONGEST_BACKLOG_S``; None
-            where nobody knows.
-        foresight: Robots slow before they reach a zone, too: the rule asks for it.
-        rule: Values of the rule that robots judge by themselves.
+        alert: The newest alert; None: there is none.
+        alerts: All present alerts.
+        pose: Pose of the observer by iVeg; None: unknown.
+        speed_limits: Limits of all judged robots, clear ones included.
+        seen: Robot → ``seq`` of the newest safety report that iVeg has received.
+        backlog_s: Time by which Orion is late (s), at most ``LONGEST_BACKLOG_S``; None:
+            unknown.
+        foresight: Whether robots also slow before they reach a zone, by the rule.
+        rule: Values of the rule by which robots judge themselves.
     """
 
     robot_id: Text

@@ -1,8 +1,8 @@
 """The fleet as data: its robots, live or recorded, and the profile of each.
 
-Files are read in ``adapters/fleet_files``; here are the values.  A robot without a
+``adapters/fleet_files`` reads the files into these values.  A robot without a
 description gets the most cautious profile: the largest body, the weakest brakes, and a
-camera that can clear no spot.
+camera that proves no spot empty.
 """
 
 import re
@@ -25,7 +25,7 @@ RESERVED_IDS = frozenset({"climate", "iveg-canary"})
 
 
 def as_counted(robot_id: str) -> tuple[tuple[str, int], ...]:
-    """Sorts names as people count: R2 before R10."""
+    """Sort key of an id in the order of people: R2 before R10."""
     parts = _NUMBER.split(robot_id)
     numbers = [int(number) for number in parts[1::2]]
     return tuple(zip(parts[::2], [*numbers, 0], strict=True))
@@ -37,17 +37,21 @@ class RobotProfile:
 
     Attributes:
         drive: ``differential`` (turns on the spot) or ``ackermann``.
-        length: Along x (m); ``width`` along y (m).
-        max_speed: What it may drive at most (m/s); ``max_turn`` (rad/s).
-        turning_radius: Least radius (m); 0 for one that turns on the spot.
-        acceleration: (m/s²); ``braking`` (m/s²) what the drive does when asked to halt.
-        assumed_braking: What margins may count on (m/s²).
-        camera: Pose of the camera in ``base_link``; ``camera_height`` (m).
-        camera_fov: What the camera sees across (rad); 0: nobody knows, so that a spot
-            is never taken for empty.
-        camera_range: How far it may see (m).
-        unlabelled_frame: The frame of boxes that come without one; None: nobody knows.
-        camera_frame: Whole name of the camera's frame; None: a usual one.
+        length: Length along x (m).
+        width: Width along y (m).
+        max_speed: Greatest speed (m/s).
+        max_turn: Greatest turn rate (rad/s).
+        turning_radius: Least radius (m); 0: it turns on the spot.
+        acceleration: Acceleration of the drive (m/s²).
+        braking: Deceleration of the drive when it halts (m/s²).
+        assumed_braking: Deceleration on which margins rely (m/s²).
+        camera: Pose of the camera in ``base_link``.
+        camera_height: Height of the camera (m).
+        camera_fov: Horizontal field of view (rad); 0: unknown, so that it proves no
+            spot empty.
+        camera_range: Greatest distance at which it may see (m).
+        unlabelled_frame: Frame of boxes that name none; None: unknown.
+        camera_frame: Whole name of the camera's frame; None: a usual name.
         laser: Pose of the laser in ``base_link``.
     """
 
@@ -70,7 +74,7 @@ class RobotProfile:
 
     @property
     def has_known_camera(self) -> bool:
-        """Whether somebody said where the camera is and what it sees."""
+        """Whether the pose and the view of the camera are described."""
         return self.camera_fov > 0.0
 
 
@@ -84,12 +88,14 @@ class RobotDescription:
     """One robot of the fleet.
 
     Attributes:
+        robot_id: Id of the robot.
         kind: ``recording``: a replay plays it; it never slows or frees a live robot.
-        has_detector: Whether its detection frames are waited for: while they are
-            missing, nobody in its reach is clear.
-        is_described: Whether somebody said what it is; else the profile is cautious.
-        classes: Names of its detector's classes by number; none: it says words.
-        pose_frame: Frame in which its odometry tells where it is in the greenhouse.
+        profile: Its profile.
+        is_described: Whether it has a description; else the profile is cautious.
+        has_detector: Whether its detection frames are required: while they are missing,
+            no robot in its reach is clear.
+        pose_frame: Frame of odometry that counts as ``map``.
+        classes: Names of its detector's classes by number; empty: it sends words.
     """
 
     robot_id: str
@@ -103,19 +109,19 @@ class RobotDescription:
 
 @dataclass(frozen=True, slots=True)
 class FleetDescription:
-    """Every robot of the fleet, by id, in the order that people see."""
+    """All robots of the fleet by id, in the order of display."""
 
     members: Mapping[str, RobotDescription] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, robots: Iterable[RobotDescription]) -> "FleetDescription":
+    def from_robots(cls, robots: Iterable[RobotDescription]) -> "FleetDescription":
         """The fleet of these robots."""
         return cls({robot.robot_id: robot for robot in robots})
 
     @classmethod
     def undescribed(cls, robot_ids: Iterable[str]) -> "FleetDescription":
-        """Live robots of which nothing but the id is known."""
-        return cls.of(RobotDescription(robot_id) for robot_id in robot_ids)
+        """A fleet of live robots without a description."""
+        return cls.from_robots(RobotDescription(robot_id) for robot_id in robot_ids)
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -128,12 +134,12 @@ class FleetDescription:
 
 
 NOBODY = FleetDescription()
-"""A fleet of which nothing is known."""
+"""A fleet without a description of any robot."""
 
 
 @lru_cache(maxsize=1024)
 def is_robot_id(text: str) -> bool:
-    """Whether a robot may be called so."""
+    """Whether a text may be the id of a robot."""
     return ROBOT_ID.fullmatch(text) is not None and text not in RESERVED_IDS
 
 
@@ -141,11 +147,12 @@ def split_word(word: str) -> tuple[str, Kind | None] | None:
     """A robot's id and kind in the short form: ``D1`` or ``D1:recording``.
 
     Returns:
-        None where it is neither; kind None where the word says none.
+        None: it is no robot; kind None: the word names no kind.
     """
     robot_id, colon, kind = word.strip().partition(":")
     if not is_robot_id(robot_id):
         return None
+    # Without a kind the fleet file decides, or the default.
     if not colon:
         return robot_id, None
     if kind == "live":

@@ -2,15 +2,15 @@
 
 A box in ``map`` or ``base_link`` stays as it is; one of the camera is taken to
 ``base_link`` by the mount in the robot's description.  A box without a frame is in the
-one that the description names, and in either ``base_link`` or ``camera_link`` where it
-names none.  A frame that nobody described has no place: that is doubt, not a guess.
+frame that the description names; where it names none, the box counts in ``base_link``
+and in ``camera_link``.  A box in a frame that nobody described has no place.
 """
 
 from functools import lru_cache
 from typing import Literal, NamedTuple
 
 from iveg.domain.fleet import Frame, RobotDescription, RobotProfile
-from iveg.domain.geometry import Box3D
+from iveg.domain.geometry import Box3D, Pose2D
 from iveg.domain.observations import Detection
 
 _NAMED: dict[str, Frame] = {
@@ -28,16 +28,23 @@ _EITHER: tuple[Frame, ...] = ("base_link", "camera_link")
 
 
 class FramedBox(NamedTuple):
-    """A box in a frame whose pose in ``map`` is the world's or the robot's own."""
+    """A box in ``map``, or in the ``base_link`` of the robot that saw it."""
 
     box: Box3D
     frame_id: Literal["map", "base_link"]
+
+    def position(self, pose: Pose2D | None) -> tuple[float, float, float] | None:
+        """Centre in ``map`` (m), seen by a robot at ``pose``; None: unknown."""
+        x, y, z = self.box.centre
+        if self.frame_id == "map":
+            return x, y, z
+        return None if pose is None else (*pose.transform(x, y), z)
 
 
 def resolve_box(
     detection: Detection, robot: RobotDescription
 ) -> tuple[FramedBox | None, ...]:
-    """The box of a detection, once for each frame that it may be in.
+    """Boxes of a detection, once for each frame that it may be in.
 
     Returns:
         None in place of a box whose frame nobody described.
@@ -54,22 +61,21 @@ def _frames_of(
     if frame_id is not None:
         if is_pose_frame(frame_id, robot):
             return ("map",)
-        camera = robot.profile.camera_frame
-        return (frame_named(frame_id, robot.robot_id, camera),)
+        return (frame_named(frame_id, robot.robot_id, robot.profile.camera_frame),)
     described = robot.profile.unlabelled_frame
     return _EITHER if described is None else (described,)
 
 
 @lru_cache(maxsize=256)
 def frame_named(name: str, robot_id: str, camera: str | None = None) -> Frame | None:
-    """The frame that a robot means by a name of TF; None for a name that is unknown.
+    """Frame that a robot means by a name of TF; None for an unknown name.
 
     Args:
-        name: Counts whole but for leading slashes and the robot's own prefix:
-            ``/map``, ``AGI/base_link``, ``agi_camera_link``.  The prefix of another
-            robot is unknown.
+        name: The whole name; leading slashes and the robot's own prefix do not count
+            (``/map``, ``AGI/base_link``, ``agi_camera_link``).  A name with the prefix
+            of another robot is unknown.
         robot_id: The robot.
-        camera: Name of its camera's frame, where that is another.
+        camera: Name of its camera's frame, where the description has another.
     """
     whole = _whole_names(name, robot_id)
     if camera is not None and camera in whole:
@@ -85,17 +91,19 @@ def is_pose_frame(name: str, robot: RobotDescription) -> bool:
 
 def may_be_laser_frame(name: str, robot_id: str) -> bool:
     """Whether a scan may be in a frame of this name: a level one on the robot."""
+    # A scan is level; the plane of an optical frame stands upright.
     whole = _whole_names(name, robot_id)
     is_elsewhere = not _NOT_ON_ROBOTS.isdisjoint(whole)
     return bool(whole) and not is_elsewhere and "optical" not in name
 
 
 def _whole_names(name: str, robot_id: str) -> tuple[str, ...]:
-    """A frame's name without slashes and prefix of the robot; none: of another robot.
+    """A frame's name without slashes and the robot's prefix; empty: another robot's.
 
-    A robot may be called as a frame begins, so both readings of such a name count.
+    A frame's name may begin with a robot's name by chance, so both readings count.
     """
     *prefix, last = name.strip("/").split("/")
+    # Names in ROS have an underscore where an id has a hyphen.
     own = robot_id.lower().replace("-", "_")
     if prefix and prefix[-1].lower() not in (own, robot_id.lower()):
         return ()
@@ -123,7 +131,7 @@ def _upright(box: Box3D) -> Box3D:
 def _in_base_link(box: Box3D, profile: RobotProfile) -> Box3D:
     """From ``camera_link`` to ``base_link``: the hull of the turned box.
 
-    The centre of the hull is the turned centre.
+    Turning keeps the centre: the centre of the hull is the turned centre.
     """
     corners = [
         profile.camera.transform(x, y)

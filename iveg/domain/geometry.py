@@ -1,7 +1,7 @@
 """Plane geometry in the frames of REP-105, in metres and radians (REP-103).
 
-x points forward, y left, angles grow counter-clockwise.  A ``Pose2D`` is always "of A
-in B": the robot's pose in ``map``, the laser's pose in ``base_link``.
+x points forward, y left, angles grow counter-clockwise.  A ``Pose2D`` is the pose of
+one frame in another, such as the laser's in ``base_link``.
 """
 
 import math
@@ -15,7 +15,7 @@ from pydantic import Field
 from iveg.domain.wire import Metres, Radians, Speed, digits
 
 _Coordinate = TypeVar("_Coordinate", float, NDArray[np.float64])
-"""Of one point, or of several (m)."""
+"""Coordinate of one point or of several (m)."""
 
 
 def wrap_angle(angle: float) -> float:
@@ -34,24 +34,25 @@ class Pose2D:
     def transform(
         self, x: _Coordinate, y: _Coordinate
     ) -> tuple[_Coordinate, _Coordinate]:
-        """Take points from the inner frame to the outer one."""
+        """Transform points from the inner frame to the outer one (m)."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return self.x + c * x - s * y, self.y + s * x + c * y
 
     def inverse(
         self, x: _Coordinate, y: _Coordinate
     ) -> tuple[_Coordinate, _Coordinate]:
-        """Take points from the outer frame to the inner one."""
+        """Transform points from the outer frame to the inner one (m)."""
         c, s, dx, dy = math.cos(self.yaw), math.sin(self.yaw), x - self.x, y - self.y
         return c * dx + s * dy, c * dy - s * dx
 
     def compose(self, inner: "Pose2D") -> "Pose2D":
-        """The pose of what ``inner`` describes, in the outer frame."""
+        """The pose ``inner``, which is in the inner frame, in the outer frame."""
         x, y = self.transform(inner.x, inner.y)
         return Pose2D(x, y, wrap_angle(self.yaw + inner.yaw))
 
     def interpolate(self, later: "Pose2D", fraction: float) -> "Pose2D":
-        """The pose ``fraction`` (0 to 1) of the way to ``later``, turning least."""
+        """The pose at a ``fraction`` (0 to 1) of the way to ``later``."""
+        # The shorter turn: from 179° to −179° the heading passes 180°, not 0°.
         turn = wrap_angle(later.yaw - self.yaw)
         return Pose2D(
             self.x + fraction * (later.x - self.x),
@@ -102,14 +103,14 @@ class Box3D:
 
     @property
     def longer_side(self) -> float:
-        """The longer of both (m)."""
+        """The longer of both horizontal sides (m), where z is up."""
         return max(self.xmax - self.xmin, self.ymax - self.ymin)
 
 
 PERSON_RADIUS_M, PERSON_HEIGHT_M = 0.25, 1.75
 
 
-def box_of_a_person(x: float, y: float) -> Box3D:
+def person_box(x: float, y: float) -> Box3D:
     """A box of a person's size on the floor about a position (m)."""
     r = PERSON_RADIUS_M
     return Box3D(x - r, x + r, y - r, y + r, 0.0, PERSON_HEIGHT_M)
@@ -130,7 +131,7 @@ class Rectangle:
         return (self.xmin + self.xmax) / 2, (self.ymin + self.ymax) / 2
 
     def joined(self, other: "Rectangle") -> "Rectangle":
-        """The least one that holds both."""
+        """The smallest rectangle that contains both."""
         return Rectangle(
             min(self.xmin, other.xmin),
             min(self.ymin, other.ymin),
@@ -152,7 +153,7 @@ class Rectangle:
         )
 
     def crosses(self, ax: float, ay: float, bx: float, by: float) -> bool:
-        """Whether the segment a-b passes through (slab method)."""
+        """Whether the segment a-b crosses the rectangle (slab method)."""
         low, high = 0.0, 1.0
         for start, end, least, most in (
             (ax, bx, self.xmin, self.xmax),

@@ -1,20 +1,21 @@
-"""Goals that people give to robots, below STOP in every respect (docs/safety.md).
+"""Goals that people give to robots; STOP goes before them in all (docs/safety.md).
 
-A goal lies in the greenhouse, and in no plant, post or crate; ``REASONS`` has the codes
-of the contract (docs/interfaces/commands.md) for a goal that is refused.  Its life is a
+A goal lies in the greenhouse, and in no plant, post or crate.  ``REASONS`` has the
+codes of refused goals (docs/interfaces/commands.md).  The states of a goal follow a
 table: state × event → new state. ::
 
     SENT ──accepted──> DRIVING ──reached──> REACHED      SENT ──refused──> REFUSED
-      └──expired──> UNCONFIRMED: nobody sends it again, and a late word still counts
+      └──expired──> UNCONFIRMED: never sent again; a late answer still counts
     SENT, DRIVING, UNCONFIRMED ──cancel──> CANCELLING ──dropped──> CANCELLED
                                                └──expired──> UNCONFIRMED
     every open state ──held──> DELETED        every open state ──replaced──> REPLACED
 
-A pair without a row changes nothing: what has ended stays ended.
+A pair without a row changes nothing: an ended goal stays ended.
 """
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Literal
 
 from iveg.domain.errors import CommandRefusedError
@@ -30,10 +31,10 @@ GoalKind = Literal["here", "aisle", "return", "pause"]
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A place to drive to and to stay at; ``pause``: the place where the robot is.
+    """A place to drive to and to stay at; ``pause``: the robot's own place.
 
     Attributes:
-        x: In ``map`` (m); ``y`` too.
+        x: Position in ``map`` (m); ``y`` likewise.
     """
 
     goal_id: str
@@ -44,12 +45,12 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class GoalOrder:
-    """A goal, and until when it may be taken.
+    """Order to drive to a goal, with its expiry.
 
     Attributes:
-        challenge: Of the robot's newest report: every hold and resume makes another,
-            so that no copy outlives a STOP.
-        until_s: The last moment of the robot's own monotonic clock (s).
+        challenge: Challenge of the robot's newest report.  Every hold and resume makes
+            a new one, so that no copy of the order outlives a STOP.
+        until_s: Expiry on the robot's own monotonic clock (s).
     """
 
     goal: Goal
@@ -59,7 +60,7 @@ class GoalOrder:
 
 @dataclass(frozen=True, slots=True)
 class CancelOrder:
-    """Forget this goal, and stay where you are."""
+    """Order to drop a goal and to stay."""
 
     goal_id: str
 
@@ -81,7 +82,7 @@ REASONS: Mapping[str, str] = {
 
 
 def refusal(robot_id: str, why: str) -> CommandRefusedError:
-    """The error that refuses a goal for a reason of the table."""
+    """Error that refuses a goal for a reason of the table."""
     return CommandRefusedError(robot_id, "goal", why, REASONS[why])
 
 
@@ -90,11 +91,11 @@ _STEP_M = 0.25
 
 @dataclass(frozen=True, slots=True)
 class GoalWish:
-    """A person's wish.
+    """Request of a person for a goal.
 
     Attributes:
-        x: Of ``here``, in ``map`` (m); ``y`` too.
-        aisle: Label of a lane, for ``aisle``.
+        x: Position for ``here``, in ``map`` (m); ``y`` likewise.
+        aisle: Label of the lane for ``aisle``.
     """
 
     kind: GoalKind
@@ -110,19 +111,20 @@ def place_of(
     pose: Pose2D,
     start: Pose2D | None,
 ) -> tuple[float, float] | str:
-    """The place that is meant (m), or the code of what is wrong with it.
+    """Place of a wish in ``map`` (m), or the code of its refusal.
 
     Args:
         wish: The wish.
-        greenhouse: What stands there.
+        greenhouse: Greenhouse with its plants, posts and obstacles.
         profile: Body of the robot: half its width must be free about the place.
-        pose: Where the robot is.
-        start: Where it belongs; None where nobody knows.
+        pose: Present pose of the robot.
+        start: Pose where the robot belongs; None: unknown.
     """
     keep_off_m = profile.width / 2
     place = wish.x, wish.y
     match wish.kind:
         case "pause":
+            # Not checked: a robot must be able to stay wherever it is.
             return pose.x, pose.y
         case "return":
             if start is None:
@@ -143,7 +145,7 @@ def place_of(
 def _obstructed(
     greenhouse: Greenhouse, x: float, y: float, keep_off_m: float
 ) -> str | None:
-    """Code of what stands at a place; None where a robot fits."""
+    """Code of the obstruction of a place; None where a robot fits."""
     if not greenhouse.bounds.contains(x, y, -keep_off_m):
         return "outside"
     if any(row.contains(x, y, keep_off_m) for row in greenhouse.rows):
@@ -159,13 +161,13 @@ def _obstructed(
 
 
 def _from_the_middle(area: Rectangle) -> Iterator[tuple[float, float]]:
-    """Places on the middle line of a lane, from its middle outwards."""
+    """Places on the middle line of a lane (m), from its middle outwards."""
     x, y = area.middle
     along_x = area.xmax - area.xmin >= area.ymax - area.ymin
     half = (area.xmax - area.xmin if along_x else area.ymax - area.ymin) / 2
     for step in range(int(half / _STEP_M) + 1):
-        for away in (step * _STEP_M, -step * _STEP_M):
-            yield (x + away, y) if along_x else (x, y + away)
+        for offset in (step * _STEP_M, -step * _STEP_M):
+            yield (x + offset, y) if along_x else (x, y + offset)
 
 
 GoalState = Literal[
@@ -190,7 +192,7 @@ GoalEvent = Literal[
     "replaced",
 ]
 ANSWERED_WITHIN_S = 10.0
-"""An order that the robot has not answered by then is not confirmed (s)."""
+"""Time without an answer of the robot after which an order is unconfirmed (s)."""
 
 OPEN_STATES: tuple[GoalState, ...] = ("SENT", "DRIVING", "UNCONFIRMED", "CANCELLING")
 _TABLE: Mapping[tuple[GoalState, GoalEvent], GoalState] = {
@@ -211,21 +213,24 @@ _TABLE: Mapping[tuple[GoalState, GoalEvent], GoalState] = {
 
 @dataclass(frozen=True, slots=True)
 class FollowedGoal:
-    """One goal from a person's wish to its end.
+    """One goal, from the wish of a person to its end.
 
     Attributes:
-        by: The person who gave it.
-        sent: When; ``answered``: the robot's first word; ``ended``: its last change.
-        asked: When the robot was last asked something: goal or cancellation.
+        by: Name of the person.
+        sent: Time of its order.
+        ordered: Time of the newest order: the goal, or its cancellation.
+        aisle: Label of the lane that the person named.
         why: Code of the robot's refusal.
-        forgotten: When the robot itself first said that it drives to it no longer.
+        answered: First answer of the robot.
+        ended: Time of the change to a state that is not open.
+        forgotten: First report of the robot that it does not drive to the goal.
     """
 
     robot_id: str
     goal: Goal
     by: str
     sent: Instant
-    asked: Instant
+    ordered: Instant
     aisle: str | None = None
     state: GoalState = "SENT"
     why: str | None = None
@@ -241,27 +246,27 @@ class FollowedGoal:
     def after(
         self, event: GoalEvent, at: Instant, why: str | None = None
     ) -> "FollowedGoal":
-        """The goal after an event; itself where that changes nothing."""
+        """The goal after an event; the same object where the event changes nothing."""
         state = _TABLE.get((self.state, event))
         if state is None:
             return self
-        is_word = event in ("accepted", "refused", "reached", "dropped")
+        is_answer = event in ("accepted", "refused", "reached", "dropped")
         return replace(
             self,
             state=state,
             why=why,
-            asked=at if event == "cancel" else self.asked,
-            answered=at if is_word and self.answered is None else self.answered,
+            ordered=at if event == "cancel" else self.ordered,
+            answered=at if is_answer and self.answered is None else self.answered,
             ended=None if state in OPEN_STATES else at,
         )
 
     def is_overdue(self, now: Instant) -> bool:
-        """Whether what was asked last can be answered no more."""
-        return now.mono - self.asked.mono > ANSWERED_WITHIN_S
+        """Whether the time to answer the newest order is over."""
+        return now.mono - self.ordered.mono > ANSWERED_WITHIN_S
 
 
 def permit(robot: RobotState, stop_state: str, goal: Goal, now: Instant) -> GoalOrder:
-    """The order that gives a goal to a robot that is free to drive.
+    """Order for a goal to a robot that is free to drive.
 
     Args:
         robot: The robot.
@@ -270,19 +275,20 @@ def permit(robot: RobotState, stop_state: str, goal: Goal, now: Instant) -> Goal
         now: This moment.
 
     Raises:
-        CommandRefusedError: it is not, with the code of the reason.
+        CommandRefusedError: the robot is not free; with the code of the reason.
     """
-    report, why = robot.safety, _why_not(robot, stop_state, now)
-    if why is None and report is not None:
+    report, reason = robot.safety, _why_not(robot, stop_state, now)
+    if reason is None and report is not None:
         until_s = _own_clock(robot, report)
         if report.challenge is not None and until_s is not None:
+            # The robot drops the order when iVeg stops waiting for its answer.
             return GoalOrder(goal, report.challenge, until_s + ANSWERED_WITHIN_S)
-        why = "no_clock"
-    raise refusal(robot.robot_id, why or "no_report")
+        reason = "no_clock"
+    raise refusal(robot.robot_id, reason or "no_report")
 
 
 def _why_not(robot: RobotState, stop_state: str, now: Instant) -> str | None:
-    """Code of the first reason against any goal."""
+    """Code of the first reason against any goal; None: the robot is free to drive."""
     report, received = robot.safety, robot.safety_received
     if robot.is_replay:
         return "recording"
@@ -292,17 +298,17 @@ def _why_not(robot: RobotState, stop_state: str, now: Instant) -> str | None:
         return "doubt"
     if robot.link(now) != "LIVE":
         return "no_pose"
-    if report is None or received is None:
+    age_s = inf if received is None else now.mono - received.mono
+    if report is None or age_s > LIMITS.report_fresh_s:
         return "no_report"
-    if now.mono - received.mono > LIMITS.report_fresh_s:
-        return "no_report"
-    # A robot that waits for its resume has no hold any more, and says 0, ``hold``.
+    # A robot that waits for its resume has no hold, and reports 0 with reason ``hold``.
     return "held" if report.holds or report.reason == "hold" else None
 
 
 def _own_clock(robot: RobotState, report: SafetyReport) -> float | None:
-    """The newest moment of the robot's own clock that it told (s), in this boot."""
+    """Newest known moment of the robot's own clock in its present boot (s)."""
     origins = [report.origin, *([robot.odometry.origin] if robot.odometry else [])]
+    # Each boot has a monotonic clock of its own: moments of another one do not count.
     moments = [
         origin.mono
         for origin in origins

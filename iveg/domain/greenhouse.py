@@ -5,11 +5,12 @@ from dataclasses import dataclass
 from iveg.domain.geometry import Pose2D, Rectangle
 
 OUTSIDE_M = 2.0
+"""Distance outside the wall at which robots may be, by default (m)."""
 
 
 @dataclass(frozen=True, slots=True)
 class DriveLane:
-    """A corridor to drive in, with the label that people know it by."""
+    """A corridor to drive in, with its label for people."""
 
     label: str
     area: Rectangle
@@ -37,11 +38,15 @@ class Greenhouse:
     """Everything in the greenhouse that does not move, in ``map`` (m).
 
     Attributes:
+        name: Its name.
         bounds: The outer wall.
-        lanes: Where robots and people go.
-        rows: Crop; hides what is behind it from cameras and lasers.
-        outside_m: How far outside robots may be, on a yard or for the walls' error (m).
-        starts: Where each robot of a scenario may begin, in order.
+        lanes: Corridors of robots and people.
+        rows: Crop rows, which block the view of cameras and lasers.
+        posts: Structural posts.
+        obstacles: Crate stacks and trolleys.
+        starts: Poses at which the robots of a scenario may begin, in order.
+        outside_m: Distance outside the wall at which robots may be, in a yard or by the
+            error of the wall (m).
     """
 
     name: str
@@ -55,7 +60,7 @@ class Greenhouse:
 
     @property
     def robots_within(self) -> Rectangle:
-        """Where robots may be."""
+        """Area in which robots may be."""
         out, bounds = self.outside_m, self.bounds
         return Rectangle(
             bounds.xmin - out, bounds.ymin - out, bounds.xmax + out, bounds.ymax + out
@@ -66,7 +71,7 @@ class Greenhouse:
         return not any(row.crosses(ax, ay, bx, by) for row in self.rows)
 
     def lane_at(self, x: float, y: float) -> str | None:
-        """The label of the lane that holds a point."""
+        """Label of the lane that contains a point; None: no lane does."""
         return next(
             (lane.label for lane in self.lanes if lane.area.contains(x, y)), None
         )

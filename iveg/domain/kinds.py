@@ -1,9 +1,9 @@
-"""The kinds of observation: one row each, from which all else of a kind follows.
+"""Kinds of observation: one row each.
 
 Device, topics, subscription, order, history, alert, REST member and the row on a card
-are read from here; nothing is guessed from a class's name.  What a small sensor's value
-is stands in its observation (``quantity``), so it needs no reader and no writer of its
-own; kinds with a shape of their own have theirs in ``iveg.ngsi.codec``.
+follow from this row, never from a class's name.  The observation of a small sensor
+declares its quantities (``domain.quantities``), so it needs no reader and no
+writer of its own.  Kinds with a shape of their own have theirs in ``iveg.ngsi.codec``.
 """
 
 from collections.abc import Mapping
@@ -27,9 +27,9 @@ from iveg.domain.observations import (
 )
 
 Scope = Literal["off", "safety", "all"]
-"""What is read directly from MQTT beside FIWARE: each is part of the next."""
+"""Extent of reading MQTT directly beside FIWARE; each includes the one before."""
 SCANS_APART_S = 0.045
-"""A page draws 15 a second and the costmap 4; of 30 that come every second is read."""
+"""Least time between scans that are read (s): a page draws 15 a second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class Low:
     Attributes:
         value: Name of the quantity.
         below: Raised at or below this, cleared at or above ``above``.
-        unless: Name of a flag under which a low value is nothing wrong.
+        unless: Name of a flag under which a low value is no fault.
     """
 
     value: str
@@ -55,9 +55,9 @@ class Sensor:
     Attributes:
         shown: Name of the quantity on the card (``robot.{name}_level``; while a flag
             of the sensor is true, ``robot.{name}_{flag}``).
-        every_s: How often a robot sends it (s).
-        kept_every_s: The history keeps one of this time (s).
-        low: When it is worth an alert.
+        every_s: Time between its messages (s).
+        kept_every_s: Time between its rows in the history (s).
+        low: Bounds of its alert; None: it raises none.
     """
 
     shown: str
@@ -68,30 +68,30 @@ class Sensor:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """One row.
+    """One row: a kind of observation.
 
     Attributes:
-        of: The observation.
-        name: In subscriptions, history, REST, live, and keys of translations.
-        suffix: Of its device and topics, after the robot's id; None: no device of its
-            own.
-        attributes: Of the robot's entity, with their NGSI types.  The origin stands in
-            the last object.
+        type_: Type of the observation.
+        name: Its name in subscriptions, history, REST, live and translations.
+        suffix: End of its device's id and its topics, after the robot's id; None: no
+            device of its own.
+        attributes: Its attributes of the robot's entity, with their NGSI types.  The
+            origin is in the last object.
         speaks_alone: Whether its device may also speak to iVeg alone, past the agent.
-        floor_hz: Least rate through the agent while Orion is behind; None: its own.
-        ordered: By the robot's own count, or by arrival.
+        floor_hz: Least rate through the agent while Orion is behind (Hz); None: any.
+        ordered: Order of its messages: the robot's own count, or arrival.
         lands: Member of ``RobotState`` or ``World`` that keeps the newest; None for an
-            event: the machine of its command or the health monitor takes it.
-        changes: Live topic that is new with it; those of detections depend on what is
-            seen, those of a command on the machine.
-        direct: From which scope on it is read straight from MQTT; ``off`` never.
-        qos: There.
-        apart_s: There, least time between two of a robot that are read (s).
+            event, which the machine of its command or the health monitor takes.
+        changes: Live topic that is new with it; detections and commands change further
+            topics by their content.
+        direct: Least scope in which it is read straight from MQTT; ``off``: never.
+        qos: MQTT quality of service of that direct topic.
+        apart_s: Least time between two of a robot that are read directly (s).
         vital: Whether a STOP or a speed limit may rest on it.
-        sensor: What is shown and kept of it, for a small sensor.
+        sensor: Display and storage of a small sensor; None for other kinds.
     """
 
-    of: type[Observation]
+    type_: type[Observation]
     name: str
     suffix: str | None = None
     attributes: tuple[tuple[str, str], ...] = ()
@@ -107,10 +107,10 @@ class Kind:
     sensor: Sensor | None = None
 
 
-def _sensed(of: type[Observation], name: str, sensor: Sensor) -> Kind:
-    """The row of a small sensor: all that is alike for each of them."""
+def _sensed(type_: type[Observation], name: str, sensor: Sensor) -> Kind:
+    """Row of a small sensor, with the common values of all small sensors."""
     return Kind(
-        of,
+        type_,
         name,
         f"_{name}",
         ((name, "object"),),
@@ -145,6 +145,7 @@ KINDS = (
         changes="scan",
         direct="all",
         apart_s=SCANS_APART_S,
+        # Not vital: laser tracks rest on robots' reports, and scans feed the costmap.
     ),
     Kind(
         DetectionFrame,
@@ -186,6 +187,7 @@ KINDS = (
             low=Low("percentage", below=0.20, above=0.25, unless="charging"),
         ),
     ),
+    # The agent writes it, so it has no count of the robot.
     Kind(CommandStatus, "command_status", ordered="by arrival", lands="command_status"),
     Kind(
         CommandAnswer,
@@ -201,24 +203,24 @@ KINDS = (
 """A floor is a little above the contract's 1, 3 and 5 Hz, so that a late timer still
 keeps it."""
 
-KIND_OF: Mapping[type[Observation], Kind] = {kind.of: kind for kind in KINDS}
+KIND_OF: Mapping[type[Observation], Kind] = {kind.type_: kind for kind in KINDS}
 MEASURED = tuple(kind for kind in KINDS if kind.suffix is not None)
-"""Kinds that a robot has a device for."""
+"""Kinds for which a robot has a device."""
 SENSED = tuple(kind for kind in KINDS if kind.sensor is not None)
-"""Small sensors."""
+"""Kinds of small sensors."""
 
 
-def row_of(of: type[Observation]) -> Kind:
-    """The row of a kind.
+def row_of(type_: type[Observation]) -> Kind:
+    """Row of a type of observation.
 
     Raises:
         LookupError: it has none.
     """
-    if of not in KIND_OF:
-        raise LookupError(f"{of.__name__} has no row in iveg/domain/kinds.py")
-    return KIND_OF[of]
+    if type_ not in KIND_OF:
+        raise LookupError(f"{type_.__name__} has no row in iveg/domain/kinds.py")
+    return KIND_OF[type_]
 
 
 def kind(observation: Observation) -> Kind:
-    """The row of an observation."""
+    """Row of an observation."""
     return KIND_OF[kind_of(observation)]

@@ -1,4 +1,4 @@
-"""Where the milliseconds go: each message timed at each hop that it passed.
+"""Latency of each message at each hop that it passes.
 
 ::
 
@@ -7,9 +7,9 @@
                   └────────── robot_orion ────────┘
 
 The paper tabulates Δt₁ (robot to MQTT broker) and Δt₂ (broker to IoT Agent to Orion),
-section "Temporal determinism"; Δt₃ and Δt₄ go on from there to the eye.  A ``Stream``
-matches the copies of each message, a ``Series`` keeps the durations of one hop, and
-``PAPER`` has the numbers to stand beside them.
+section "Temporal determinism".  Δt₃ and Δt₄ continue from there to the screen.  A
+``Stream`` matches the copies of each message, a ``Series`` keeps the durations of one
+hop, and ``PAPER`` has the numbers of the paper for comparison.
 """
 
 from collections import Counter, deque
@@ -33,34 +33,30 @@ from iveg.domain.observations import (
 from iveg.domain.transports import FIWARE
 
 Segment = Literal["uplink", "fiware", "robot_orion", "iveg", "screen"]
-"""``uplink`` Δt₁: the robot's stamp to iVeg's own reading of the broker; ``fiware``
-Δt₂: from there to Orion's notification at the boundary; ``robot_orion`` both as one
-number; ``iveg`` Δt₃: whichever copy was first, to the decision; ``screen`` Δt₄: from
+"""``uplink`` Δt₁: from the robot's stamp to iVeg's own reading of the broker;
+``fiware`` Δt₂: from there to Orion's notification at the boundary; ``robot_orion``:
+the sum of both; ``iveg`` Δt₃: from the first copy to the decision; ``screen`` Δt₄: from
 there to the frame that a page has drawn."""
 SEGMENTS: Final[tuple[Segment, ...]] = get_args(Segment)
 
 Data = Literal["odometry", "detections", "lidar"]
-"""The paper's three rows; its "YOLOx" is ``detections``."""
+"""Rows of the paper's table; its "YOLOx" is ``detections``."""
 DATA: Final[tuple[Data, ...]] = get_args(Data)
 
-_DATA: Final[dict[type, Data]] = {
+DATA_OF: Final[Mapping[type[Observation], Data]] = {
     Odometry: "odometry",
     DetectionFrame: "detections",
     LaserScan: "lidar",
 }
-
-
-def data_of(kind: type[Observation]) -> Data | None:
-    """The row of the table that a kind of observation belongs to; None for no row."""
-    return _DATA.get(kind)
+"""Row of each type of observation; other types have none."""
 
 
 # --- durations in little room ---------------------------------------------------------
 
 _SHORTEST_S, _LONGEST_S = 1e-6, 600.0
-"""Shorter and longer ones count as these, which bounds the bins to 1,012."""
+"""Bounds of a counted duration (s); with them there are at most 1,012 bins."""
 _GAMMA: Final = 1.01 / 0.99
-"""Ratio of neighbouring bins: a quantile is off by 1 % of itself at most."""
+"""Ratio of neighbouring bins: the relative error of a quantile is at most 1 %."""
 _LOG_GAMMA: Final = log(_GAMMA)
 
 
@@ -68,10 +64,10 @@ _LOG_GAMMA: Final = log(_GAMMA)
 class Sketch:
     """Durations of one hop, counted by logarithmic bins.
 
-    The bins are DDSketch's (Masson, Rim, Lee: VLDB 2019).
+    The bins are those of DDSketch (Masson, Rim, Lee: VLDB 2019).
 
     Attributes:
-        bins: Bin → number of durations in it.
+        bins: Number of durations by bin.
         total: Sum of the durations (s).
     """
 
@@ -79,15 +75,10 @@ class Sketch:
     total: float = 0.0
 
     def add(self, duration_s: float) -> None:
-        """Count one more, not below zero."""
+        """Count a duration (s)."""
         inside = min(max(duration_s, _SHORTEST_S), _LONGEST_S)
         self.bins[ceil(log(inside) / _LOG_GAMMA)] += 1
         self.total += duration_s
-
-    def include(self, other: "Sketch") -> None:
-        """Count those of another, too."""
-        self.bins.update(other.bins)
-        self.total += other.total
 
     @property
     def count(self) -> int:
@@ -96,32 +87,36 @@ class Sketch:
 
     @property
     def mean(self) -> float | None:
-        """(s); None of nothing."""
+        """Mean duration (s); None without data."""
         return self.total / self.count if self.bins else None
 
     def quantile(self, share: float) -> float | None:
-        """The quantile of a share (0 to 1) (s), within 1 %; None without data."""
+        """Quantile of a share (0 to 1) in s, within 1 %; None without data."""
         rank = share * (self.count - 1)
-        seen = 0
+        counted = 0
         for number, count in sorted(self.bins.items()):
-            seen += count
-            if seen > rank:
+            counted += count
+            if counted > rank:
+                # This value is off by the same ratio from both ends of its bin.
                 return 2.0 * _GAMMA**number / (1.0 + _GAMMA)
         return None
 
     def distribution(self) -> tuple[list[float], list[float]]:
-        """Rising durations (s), and the share (0 to 1) that did not exceed each."""
+        """Rising durations (s), and the share (0 to 1) of durations up to each."""
         numbers = sorted(self.bins)
         counts = accumulate(self.bins[number] for number in numbers)
         whole = self.count
-        return [_GAMMA**one for one in numbers], [count / whole for count in counts]
+        return [_GAMMA**number for number in numbers], [
+            count / whole for count in counts
+        ]
 
 
 def merged(sketches: Iterable[Sketch]) -> Sketch:
-    """All of them as one: as if their durations had gone into it."""
+    """Sketch of all durations of these sketches."""
     whole = Sketch()
     for sketch in sketches:
-        whole.include(sketch)
+        whole.bins.update(sketch.bins)
+        whole.total += sketch.total
     return whole
 
 
@@ -132,10 +127,11 @@ _SLICES: Final = 15
 class Series:
     """Durations of one hop, for one kind of data of one robot.
 
-    A minute fills one sketch; fifteen whole ones and the newest are kept.
+    Each minute has a sketch; the newest and fifteen whole minutes are kept.
 
     Attributes:
-        count: Number of durations since the start; ``total`` their sum (s).
+        count: Number of durations since the start.
+        total: Sum of the durations since the start (s).
     """
 
     def __init__(self) -> None:
@@ -143,17 +139,18 @@ class Series:
         self._slices = deque([Sketch()], maxlen=_SLICES + 1)
 
     def add(self, duration_s: float) -> None:
-        """One more message passed."""
+        """Count the duration of a message (s)."""
         self.count += 1
         self.total += duration_s
         self._slices[-1].add(duration_s)
 
     def end_slice(self) -> None:
-        """A minute is over."""
+        """Begin the sketch of another minute."""
         self._slices.append(Sketch())
 
     def parts(self) -> list[Sketch]:
-        """Sketches of the last 15 minutes; none of them changes any more."""
+        """Sketches of the last 15 minutes; no sketch changes any more."""
+        # The newest is copied, as another thread may read it while the loop adds to it.
         *whole, newest = self._slices
         return [*whole, merged([newest])]
 
@@ -161,18 +158,18 @@ class Series:
 # --- messages at their hops -----------------------------------------------------------
 
 REMEMBERED: Final = 2048
-"""A minute of 30 messages a second: FIWARE that is later is down, not late."""
+"""Copies kept by stream: a minute of 30 messages a second; later FIWARE is down."""
 
 
 class Stream:
-    """One kind of data of one robot, followed from tap to tap by its count.
+    """One kind of data of one robot, followed from hop to hop by (boot, seq).
 
     The robot's own message at the broker and Orion's notification are two copies of one
-    message; (boot, seq) says which belong together.
+    message, with the same (boot, seq).
 
     Attributes:
-        segments: Durations, by hop.
-        decided_at: When the newest was decided on (monotonic, s); None: never.
+        segments: Durations by hop.
+        decided_at: Decision on the newest message (monotonic, s); None: none yet.
     """
 
     def __init__(self, robot_id: str, data: Data, clock: ClockOffset) -> None:
@@ -182,15 +179,15 @@ class Stream:
         self._boot: str | None = None
         self._stamps: dict[Segment, float] = {}
         self._copies: dict[int, tuple[float, float | None] | None] = {}
-        """By ``seq``, oldest first: its moment at the broker (monotonic, s) and its Δt₁
-        (s), while Orion's copy is still to come; None after that."""
+        """By ``seq``, oldest first: time at the broker (monotonic, s) and Δt₁ (s) while
+        Orion's copy is still to come; None after that."""
 
     def read_from_broker(
         self, origin: Origin, at: Instant, composed_at: float | None
     ) -> None:
-        """Our own reading of the broker has it."""
+        """Take a message from our own reading of the broker."""
         seq = self._follow(origin)
-        # Where Orion's copy was first, nobody knows when it was at the broker.
+        # If Orion's copy was first, our reading is late and no time at the broker.
         if seq in self._copies:
             return
         took = self._transit("uplink", origin, at, composed_at)
@@ -198,7 +195,7 @@ class Stream:
             self._remember(seq, (at.mono, took))
 
     def notified(self, origin: Origin, at: Instant, composed_at: float | None) -> None:
-        """Orion has notified it."""
+        """Take a message from a notification of Orion."""
         seq = self._follow(origin)
         if seq not in self._copies:
             self._transit("robot_orion", origin, at, composed_at)
@@ -213,14 +210,15 @@ class Stream:
                 self.segments["robot_orion"].add(uplink_s + took)
 
     def decided(self, at: Instant, now: float) -> None:
-        """It arrived then and has just been decided on (``now`` monotonic, s)."""
+        """Take the decision at ``now`` (monotonic, s) on a message of ``at``."""
         self.segments["iveg"].add(now - at.mono)
         self.decided_at = now
 
     def _follow(self, origin: Origin) -> int | None:
-        """Its place in the count; None where it names none.  A new boot begins anew."""
+        """Number of a message in its boot; None where it has none."""
         if origin.boot is None or origin.seq is None:
             return None
+        # A new boot counts from the start: its numbers would match copies of the old.
         if origin.boot != self._boot:
             self._boot = origin.boot
             self._copies.clear()
@@ -234,7 +232,7 @@ class Stream:
     def _transit(
         self, hop: Segment, origin: Origin, at: Instant, composed_at: float | None
     ) -> float | None:
-        """Time from the robot's stamp (s); None where it does not count."""
+        """Time since the robot's stamp (s); None for a repeated or unusable stamp."""
         if origin.stamp_s is None or origin.stamp_s == self._stamps.get(hop):
             return None
         self._stamps[hop] = origin.stamp_s
@@ -245,14 +243,17 @@ class Stream:
 
 
 class LatencyWatch:
-    """Latency of the whole fleet: the calls that boundaries make for each message.
+    """Latency of the whole fleet; boundaries call it for each message.
 
-    A call costs a few microseconds (``benchmarks/latency_cost.py``), so that every
+    A call takes a few microseconds (``benchmarks/latency_cost.py``), so that every
     message of twenty robots can be timed.
 
     Args:
         robots: Ids of the fleet.
-        composed_at: When a feedback of ours was composed (monotonic, s); None unknown.
+        composed_at: Composition of a feedback (monotonic, s); None: unknown.
+
+    Attributes:
+        streams: Streams by robot and data, robot by robot.
     """
 
     def __init__(
@@ -260,20 +261,15 @@ class LatencyWatch:
     ) -> None:
         self._composed_at = composed_at
         self.clocks = {robot_id: ClockOffset() for robot_id in robots}
-        self._streams = {
+        self.streams = {
             (robot_id, data): Stream(robot_id, data, clock)
             for robot_id, clock in self.clocks.items()
             for data in DATA
         }
         self._slice_at: float | None = None
 
-    @property
-    def streams(self) -> list[Stream]:
-        """All of them, robot by robot."""
-        return list(self._streams.values())
-
     def arrived(self, received: Received) -> None:
-        """A copy came in, on either transport."""
+        """Take a copy of a message, of either transport."""
         stream = self._stream(received)
         if stream is None:
             return
@@ -284,42 +280,43 @@ class LatencyWatch:
         tap(origin, received.at, composed_at)
 
     def decided(self, taken: Iterable[Received], now: Instant) -> None:
-        """These became part of the state, and the fleet has been judged with them."""
+        """Take messages with which the fleet has just been judged."""
         for received in taken:
             stream = self._stream(received)
             if stream is not None:
                 stream.decided(received.at, now.mono)
 
     def decided_at(self, robot_id: str, data: Data) -> float | None:
-        """When the newest was decided on (monotonic, s); None: never."""
-        stream = self._streams.get((robot_id, data))
+        """Decision on the newest message (monotonic, s); None: none yet."""
+        stream = self.streams.get((robot_id, data))
         return None if stream is None else stream.decided_at
 
     def painted(
         self, robot_id: str, data: Data, decided_at: float, painted_at: float
     ) -> None:
-        """A page has drawn what was decided on then (monotonic, s, the server's)."""
+        """Take a drawing of a page (monotonic s of the server)."""
         took = painted_at - decided_at
-        stream = self._streams.get((robot_id, data))
+        stream = self.streams.get((robot_id, data))
+        # The moment comes from a browser: an impossible span must not spoil the mean.
         if stream is not None and 0.0 <= took <= LONGEST_S:
             stream.segments["screen"].add(took)
 
     def tick(self, now: Instant) -> None:
-        """Let time pass, slice by slice."""
+        """Let time pass; each minute begins new sketches."""
         if self._slice_at is None:
             self._slice_at = now.mono
         if now.mono - self._slice_at < SLICE_S:
             return
         self._slice_at = now.mono
-        for stream in self._streams.values():
+        for stream in self.streams.values():
             for series in stream.segments.values():
                 series.end_slice()
 
     def _stream(self, received: Received) -> Stream | None:
-        data = data_of(kind_of(received.observation))
-        if data is None or received.asked:
+        data = DATA_OF.get(kind_of(received.observation))
+        if data is None or received.is_query_answer:
             return None
-        return self._streams.get((received.observation.robot_id, data))
+        return self.streams.get((received.observation.robot_id, data))
 
 
 # --- the table ------------------------------------------------------------------------
@@ -330,19 +327,19 @@ Cell = tuple[Data, Segment]
 def collect(
     streams: Iterable[Stream], robot_id: str | None = None
 ) -> dict[Cell, list[Sketch]]:
-    """The sketches of one robot or of all; for the loop."""
-    found: dict[Cell, list[Sketch]] = {
+    """Sketches of one robot, or of all; called in the loop."""
+    cells: dict[Cell, list[Sketch]] = {
         (data, hop): [] for data in DATA for hop in SEGMENTS
     }
     for stream in streams:
         if robot_id in (None, stream.robot_id):
             for hop, series in stream.segments.items():
-                found[stream.data, hop] += series.parts()
-    return found
+                cells[stream.data, hop] += series.parts()
+    return cells
 
 
 def merge(parts: Mapping[Cell, list[Sketch]]) -> dict[Cell, Sketch]:
-    """One sketch a cell; for any thread."""
+    """One sketch for each cell; may be called in any thread."""
     return {cell: merged(sketches) for cell, sketches in parts.items()}
 
 
@@ -351,7 +348,7 @@ Place = Literal["simulation", "field"]
 
 @dataclass(frozen=True, slots=True)
 class PaperLatency:
-    """One row of the paper's table, all in ms; a total at P95 is a sum of two P95."""
+    """One row of the paper's table (ms); a total at P95 is the sum of two P95."""
 
     uplink_mean: float
     uplink_p95: float

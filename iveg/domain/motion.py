@@ -1,6 +1,6 @@
-"""Motion of one robot, by all that its last second of poses, twists and reports shows.
+"""Motion of one robot, by the poses, twists and reports of its last second.
 
-A word alone proves no rest: wheels slip, localisation dies, and a robot that drives
+No single source proves a rest: wheels slip, localisation dies, and a robot that drives
 sideways has no twist that iVeg reads.  So a robot moves as soon as any of the three
 shows it, and is as fast as the largest of them::
 
@@ -8,13 +8,13 @@ shows it, and is as fast as the largest of them::
     pose            changed by more than 0.10 m or rad within a second, in three steps
                     or more: one or two that stand out are jumps of a localisation
 
-Less than six changes a second (odometry through Orion) leave no room for that: there
-one step that stands out is a jump, and two alike are motion, so that a robot that is
-seen at 2 Hz moves from its second step on.  Of at least three poses however old they
-are the last two steps are compared.
+Less than six changes a second (odometry through Orion) are too few.  Then one step that
+stands out is a jump, and two equal steps are motion, so a robot with poses at 2 Hz
+moves from its second step on.  The last three poses are kept even if they are
+older than a second, so that two steps can be compared.
 
-Time is the robot's own where it tells it and does not run ahead of ours, else that of
-arrival, so that messages in a burst or after a gap show no other motion.
+Time is the robot's own, if it is sent and does not gain on ours, else that of arrival.
+So messages in a burst or after a pause show no other motion.
 """
 
 import math
@@ -31,24 +31,26 @@ from iveg.domain.observations import UNKNOWN_ORIGIN, Origin
 Contradiction = Literal["pose_against_twist", "sideways", "yaw_against_turn"]
 
 WINDOW_S = 1.0
+"""Time over which motion is measured (s)."""
 _LEAST_POSES, _FORGOTTEN_S = 3, 3.0
+"""Poses that are kept beyond the window, and their greatest age (s)."""
 _APART_S = 0.08
-"""Poses closer together are no steps of their own: thirty a second say no more."""
+"""Least time between two steps: thirty poses a second show no more (s)."""
 _JITTER = 0.06
-"""A resting pose may step so far: 3 cm (or 0.03 rad) to either side."""
+"""Greatest step of a resting pose: 3 cm or 0.03 rad to either side (m, rad)."""
 _MOST_NOISE, _NOISES = 0.09, 1.2
-"""Noise that counts at most (m, rad), and how often it may look like motion (1)."""
+"""Greatest noise that counts (m, rad), and its multiple that is no motion (1)."""
 _MANY_STEPS = 6
 _AHEAD_S = 10.0
-"""A clock that gains more on ours than any message is late tells no time."""
+"""Gain of a clock on ours beyond which it is not used: no message is so late (s)."""
 _JUDGED_S = 0.5 - 1e-6, 1.5
-"""Poses and twists are compared over so long: of fewer than two a second not at all."""
+"""Least and greatest time over which poses and twists are compared (s)."""
 LASTED_S = 0.3
-"""A contradiction that is found has lasted at least so long."""
+"""Least duration of a contradiction when it is found (s)."""
 _SLIP_SHARE, _TURN_SHARE = 0.2, 0.3
-"""Wheels slip, and more so in a turn (1)."""
+"""Slip of wheels, and slip in a turn (1)."""
 _BEHIND_M = 0.5
-"""Farthest that a robot's turning point lies behind ``base_link`` (m)."""
+"""Greatest distance of a turning point behind ``base_link`` (m)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,13 +58,14 @@ class Motion:
     """Motion of a robot over its last second.
 
     Attributes:
-        speed: Largest that pose, twist or report shows (m/s); ``turn`` (rad/s).
-        moves: Any of the three shows motion; ``pose_moves``: the pose does.
+        speed: Largest speed of pose, twist and report (m/s).
+        turn: Largest turn rate of the three (rad/s).
+        moves: Whether any of the three shows motion.
         contradiction: Fields of its odometry that contradict each other.
-        course: Direction in ``map`` in which the pose goes on (rad); None: as the twist
-            says.
-        displaced: The pose was farther than 0.10 m away within the last second, by
-            motion, noise or a jump: nobody knows yet whether the robot goes on.
+        pose_moves: Whether the pose shows motion.
+        course: Direction of the pose's motion in ``map`` (rad); None: by the twist.
+        displaced: Whether the pose was farther than 0.10 m away within the last second,
+            by motion, noise or a jump.
     """
 
     speed: float = 0.0
@@ -74,7 +77,7 @@ class Motion:
     displaced: bool = False
 
     def ahead(self, pose: Pose2D, twist: Twist2D) -> tuple[Pose2D, Twist2D]:
-        """Pose and twist to go on with from odometry, at the measured speed."""
+        """Pose and twist of odometry for a forecast, at the measured speed."""
         if self.course is not None:
             return Pose2D(pose.x, pose.y, self.course), Twist2D(self.speed, 0.0)
         if self.speed <= abs(twist.linear_x):
@@ -87,7 +90,15 @@ UNMOVED = Motion()
 
 
 class _Sample(NamedTuple):
-    """One odometry; ``at`` on the track's own axis (s), ``yaw`` without wraps (rad)."""
+    """One odometry.
+
+    Attributes:
+        at: Time on the track's own axis (s).
+        x: Position in ``map`` (m); ``y`` likewise.
+        yaw: Heading without wraps (rad).
+        linear: Speed by the twist (m/s).
+        angular: Turn rate by the twist (rad/s).
+    """
 
     at: float
     x: float
@@ -98,7 +109,7 @@ class _Sample(NamedTuple):
 
 
 class _Twist(NamedTuple):
-    """Newest speeds of one source and when they were measured (monotonic, s)."""
+    """Newest speeds of one source (m/s, rad/s); ``at``: measured (monotonic, s)."""
 
     linear: float
     angular: float
@@ -110,7 +121,8 @@ class MotionTrack:
     """Poses, twists and reports of one robot, and the motion that they show.
 
     Attributes:
-        motion: By all that was noted.
+        motion: The motion by all three.
+        _shown: Motion by poses alone.
     """
 
     motion: Motion = UNMOVED
@@ -121,7 +133,6 @@ class MotionTrack:
     _arrived: float = 0.0
     _ahead_s: float = 0.0
     _shown: Motion = UNMOVED
-    """Motion by poses alone."""
 
     def note_odometry(
         self,
@@ -134,11 +145,11 @@ class MotionTrack:
         """Note odometry; without a pose its twist alone counts.
 
         Args:
-            pose: In ``map``.
-            twist: In ``base_link``.
-            at: When it was measured, as far as known (monotonic, s).
-            origin: Whose count and clock it has.
-            arrived: When it came, if that is another moment (monotonic, s).
+            pose: Pose in ``map``.
+            twist: Twist in ``base_link``.
+            at: Time of measurement, as far as known (monotonic, s).
+            origin: Count and clock of the message.
+            arrived: Time of arrival (monotonic, s); None: ``at``.
         """
         self._twist = _Twist(abs(twist.linear_x), abs(twist.angular_z), at)
         arrived = at if arrived is None else arrived
@@ -147,17 +158,18 @@ class MotionTrack:
         return self._judge()
 
     def note_report(self, linear: float, angular: float, at: float) -> Motion:
-        """Note what a report says of speed (m/s, rad/s), measured then."""
+        """Note the speeds of a report (m/s, rad/s), measured at ``at``."""
         self._report = _Twist(abs(linear), abs(angular), at)
         return self._judge()
 
     def _judge(self) -> Motion:
-        said = [one for one in (self._twist, self._report) if one is not None]
-        newest = max(one.at for one in said)
-        said = [one for one in said if newest - one.at <= WINDOW_S]
-        linear = max(one.linear for one in said)
-        angular = max(one.angular for one in said)
-        shown = self._shown if self._twist in said else UNMOVED
+        twists = [twist for twist in (self._twist, self._report) if twist is not None]
+        newest = max(twist.at for twist in twists)
+        # A silent source must not hold its last speed for ever.
+        twists = [twist for twist in twists if newest - twist.at <= WINDOW_S]
+        linear = max(twist.linear for twist in twists)
+        angular = max(twist.angular for twist in twists)
+        shown = self._shown if self._twist in twists else UNMOVED
         self.motion = replace(
             shown,
             speed=max(linear, shown.speed),
@@ -166,17 +178,19 @@ class MotionTrack:
         )
         return self.motion
 
-    def _keep(self, pose: Pose2D, twist: Twist2D, arrived: float, of: Origin) -> bool:
-        """Keep a pose; returns whether it is so much later that it is a step."""
+    def _keep(
+        self, pose: Pose2D, twist: Twist2D, arrived: float, origin: Origin
+    ) -> bool:
+        """Keep a pose that is late enough for a step; returns whether it is."""
         samples, at, yaw = self._samples, 0.0, pose.yaw
         if samples:
             last = samples[-1]
-            ahead_s, passed_s = self._passed_s(of, arrived - self._arrived)
+            ahead_s, passed_s = self._passed_s(origin, arrived - self._arrived)
             if passed_s < _APART_S:
                 return False
             at, self._ahead_s = last.at + passed_s, ahead_s
             yaw = last.yaw + wrap_angle(pose.yaw - last.yaw)
-        self._origin, self._arrived = of, arrived
+        self._origin, self._arrived = origin, arrived
         samples.append(
             _Sample(at, pose.x, pose.y, yaw, twist.linear_x, twist.angular_z)
         )
@@ -189,7 +203,7 @@ class MotionTrack:
     def _passed_s(self, later: Origin, arrived_s: float) -> tuple[float, float]:
         """Gain of a robot's clock on ours, and the time passed (s).
 
-        By the robot's clock if that can be: it rises, and gains less than a delay.
+        The robot's clock counts if it rises, and gains less than the greatest delay.
         """
         earlier, arrived_s = self._origin, max(0.0, arrived_s)
         if earlier.boot != later.boot or (earlier.mono is None) != (later.mono is None):
@@ -204,20 +218,21 @@ class MotionTrack:
 
 
 def _shown_by(samples: Sequence[_Sample]) -> Motion:
-    """Motion that poses alone show, and how their twists contradict them."""
+    """Motion by poses alone, with their contradictions to the twists."""
     steps = list(pairwise(samples))
     seconds = [b.at - a.at for a, b in steps]
     place = _shift(seconds, [(b.x - a.x, b.y - a.y) for a, b in steps])
     heading = _shift(seconds, [(b.yaw - a.yaw, 0.0) for a, b in steps])
     contradiction = _contradiction(samples, place, heading)
     moves = place.moves or heading.moves
+    # A sideways or sliding robot moves by its poses, not by its heading.
     course = None
     if place.rate and contradiction in ("pose_against_twist", "sideways"):
         course = math.atan2(place.dy, place.dx)
     newest = samples[-1]
     displaced = any(
-        math.hypot(newest.x - one.x, newest.y - one.y) > LIMITS.standing_moved
-        for one in samples
+        math.hypot(newest.x - sample.x, newest.y - sample.y) > LIMITS.standing_moved
+        for sample in samples
     )
     return Motion(
         place.rate,
@@ -231,14 +246,14 @@ def _shown_by(samples: Sequence[_Sample]) -> Motion:
 
 
 class _Shift(NamedTuple):
-    """A change of place or heading in the window, jumps left out.
+    """A change of place or heading in the window, without jumps.
 
     Attributes:
-        moves: It is motion.
-        rate: Beyond the noise (m/s, rad/s); 0 where it is none.
+        moves: Whether it is motion.
+        rate: Rate beyond the noise (m/s or rad/s); 0 without motion.
         dx: Sum of its steps (m or rad); ``dy`` likewise.
         jumps: Numbers of the steps that are jumps.
-        noise: Of the pose (m or rad).
+        noise: Noise of the pose (m or rad).
     """
 
     moves: bool
@@ -250,7 +265,7 @@ class _Shift(NamedTuple):
 
 
 def _shift(seconds: Sequence[float], steps: Sequence[tuple[float, float]]) -> _Shift:
-    """The change that steps of so many seconds make together."""
+    """The change by ``steps`` that took these ``seconds``."""
     jumps = _jumps(seconds, steps)
     dx = dy = farthest = 0.0
     newest_jump = max(jumps, default=-1)
@@ -262,7 +277,7 @@ def _shift(seconds: Sequence[float], steps: Sequence[tuple[float, float]]) -> _S
     net, lasted = math.hypot(dx, dy), sum(seconds)
     lasted -= sum(seconds[number] for number in jumps)
     noise = _noise(steps, jumps) if max(farthest, net) > LIMITS.standing_moved else 0.0
-    # No noise hides much motion: at most that of 3 cm in each direction counts.
+    # Bounded, so that noise cannot hide motion: 3 cm to each side count at most.
     within = LIMITS.standing_moved + _NOISES * min(noise, _MOST_NOISE)
     moves = farthest > within or net > within + _JITTER * len(jumps)
     rate = max(0.0, net - min(noise, _MOST_NOISE)) / lasted if moves and lasted else 0.0
@@ -277,23 +292,23 @@ def _jumps(
     longest = max(lengths, default=0.0)
     if longest <= _JITTER:
         return frozenset()
-    most = 2 if sum(map(bool, lengths)) >= _MANY_STEPS else 1
-    large = [number for number, one in enumerate(lengths) if one >= longest / 2]
-    if len(large) > most:
+    bound = 2 if sum(map(bool, lengths)) >= _MANY_STEPS else 1
+    large = [number for number, step in enumerate(lengths) if step >= longest / 2]
+    if len(large) > bound:
         return frozenset()
-    dx, dy = sum(one[0] for one in steps), sum(one[1] for one in steps)
+    dx, dy = sum(step[0] for step in steps), sum(step[1] for step in steps)
     lasted, jumps = sum(seconds), set[int]()
     for number in large:
         others_s = max(lasted - seconds[number], 1e-3)
-        others = math.hypot(dx - steps[number][0], dy - steps[number][1]) / others_s
-        # A message that is missing makes a step longer, and no jump.
-        if lengths[number] > max(_JITTER, 2.0 * others * seconds[number]):
+        other_rate = math.hypot(dx - steps[number][0], dy - steps[number][1]) / others_s
+        # After a lost message a step is longer, but at the same pace: no jump.
+        if lengths[number] > max(_JITTER, 2.0 * other_rate * seconds[number]):
             jumps.add(number)
     return frozenset(jumps)
 
 
 def _noise(steps: Sequence[tuple[float, float]], jumps: frozenset[int]) -> float:
-    """Noise of a pose (m or rad): how unlike neighbouring steps are, in the median."""
+    """Noise of a pose (m or rad): median difference of neighbouring steps."""
     unlike = [
         math.hypot(b[0] - a[0], b[1] - a[1])
         for number, (a, b) in enumerate(pairwise(steps))
@@ -307,17 +322,20 @@ def _contradiction(
 ) -> Contradiction | None:
     """The gravest contradiction between poses and twists; None: there is none.
 
-    A jump (of place, of heading) proves nothing either way, so that it has to be found
-    with the jumps and without them.
+    A jump (of place, of heading) proves nothing either way.  So a contradiction counts
+    only if it is found with the jumps and without them.
     """
     if not _JUDGED_S[0] <= samples[-1].at - samples[0].at <= _JUDGED_S[1]:
         return None
-    none = frozenset[int]()
-    found = _unlike(samples, place._replace(jumps=none), heading._replace(jumps=none))
-    if found and (place.jumps or heading.jumps):
-        without = _unlike(samples, place, heading)
-        found = [code for code in found if code in without]
-    return next(iter(found), None)
+    codes = _unlike(
+        samples,
+        place._replace(jumps=frozenset()),
+        heading._replace(jumps=frozenset()),
+    )
+    if codes and (place.jumps or heading.jumps):
+        without_jumps = _unlike(samples, place, heading)
+        codes = [code for code in codes if code in without_jumps]
+    return next(iter(codes), None)
 
 
 def _unlike(
@@ -326,8 +344,8 @@ def _unlike(
     """Differences that slip, noise and unknown moments do not explain."""
     forward = sideways = driven = turned = steered = 0.0
     slack_m, slack_rad = (
-        LIMITS.standing_moved + _NOISES * one.noise + _JITTER * len(one.jumps)
-        for one in (place, heading)
+        LIMITS.standing_moved + _NOISES * shift.noise + _JITTER * len(shift.jumps)
+        for shift in (place, heading)
     )
     for number, (a, b) in enumerate(pairwise(samples)):
         half_s = (b.at - a.at) / 2
@@ -336,18 +354,18 @@ def _unlike(
             forward += dx * math.cos(yaw) + dy * math.sin(yaw)
             sideways += dy * math.cos(yaw) - dx * math.sin(yaw)
             driven += (a.linear + b.linear) * half_s
-            # Nobody knows when between two messages a speed changed.
+            # A change of speed may be anywhere between two messages.
             slack_m += abs(b.linear - a.linear) * half_s
         if number not in heading.jumps:
             turned += b.yaw - a.yaw
             steered += (a.angular + b.angular) * half_s
             slack_rad += abs(b.angular - a.angular) * half_s
     way_m, way_rad = max(abs(forward), abs(driven)), max(abs(turned), abs(steered))
-    found: list[Contradiction] = []
+    codes: list[Contradiction] = []
     if abs(forward - driven) > slack_m + _SLIP_SHARE * way_m:
-        found.append("pose_against_twist")
+        codes.append("pose_against_twist")
     if abs(sideways) > slack_m + _SLIP_SHARE * way_m + _BEHIND_M * way_rad:
-        found.append("sideways")
+        codes.append("sideways")
     if abs(turned - steered) > slack_rad + _TURN_SHARE * way_rad:
-        found.append("yaw_against_turn")
-    return found
+        codes.append("yaw_against_turn")
+    return codes

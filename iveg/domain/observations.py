@@ -1,8 +1,8 @@
 """Observations: frozen values, each with its robot, its order and its age.
 
-Each is the one declaration of its message: names on the wire, bounds and digits stand
-at its members.  Names are those of ``nav_msgs``, ``sensor_msgs`` and the NGSI entity;
-times are Unix seconds unless said otherwise.
+An observation is the only declaration of its message: names on the wire, bounds and
+digits stand at its members.  Names are those of ``nav_msgs``, ``sensor_msgs`` and the
+NGSI entity.  Times are Unix seconds unless said otherwise.
 """
 
 from collections.abc import Mapping
@@ -32,18 +32,21 @@ from iveg.domain.wire import (
     Speed,
     Text,
     digits,
-    one_of,
+    known_text,
     place,
 )
 
 MOST_HEARD_ALSO = 3
+"""Bound of ``heard_also``: a robot follows four authors, ours included."""
 
 
 @dataclass(frozen=True, slots=True)
 class Instant:
-    """One moment on both clocks.
+    """One moment on both clocks of iVeg.
 
-    Deadlines and ages use ``mono``; ``wall`` is for people, logs and storage.
+    Attributes:
+        mono: Monotonic seconds, for deadlines and ages.
+        wall: Unix seconds, for people, logs and storage.
     """
 
     mono: float
@@ -67,16 +70,17 @@ class Origin:
     """The count that orders a message (docs/interfaces/mqtt.md).
 
     Attributes:
-        boot: Random, new at every start of the robot; None when the sender is silent.
-        seq: One more for each message of a topic; None when the sender is silent.
+        boot: Random id, new at every start of the robot; None: not sent.
+        seq: Count of the messages of a topic; None: not sent.
         stamp: The robot's clock, exactly as sent; for display and clock offset only.
-        stamp_s: The same as Unix seconds; None where it cannot be read.
+        stamp_s: The same as Unix seconds; None: missing or unreadable.
         mono: The robot's monotonic seconds since this boot, one axis for all topics.
-        acknowledgements: The sender tells what it has heard; its age can be proven.
-        heard: The newest feedback that it had heard; None before the first.
-        heard_also: The newest of every other author that it hears.
-        replay: A recording is played: the name of the map frame that it is in, so that
-            only recordings of one frame meet.  None: a live robot says this.
+        acknowledgements: Whether the sender echoes feedback, so that its age can be
+            proven.
+        heard: The newest feedback that it had received; None before the first.
+        heard_also: The newest feedback of every other author that it receives.
+        replay: Map frame of a recording that is played; only recordings of one frame
+            see each other.  None: the sender is a live robot.
     """
 
     boot: Text | None = None
@@ -93,20 +97,20 @@ class Origin:
 
     @property
     def echoes(self) -> tuple[FeedbackRef, ...]:
-        """The newest feedback of each author that the sender had heard."""
+        """The newest feedback of each author that the sender had received."""
         return () if self.heard is None else (self.heard, *self.heard_also)
 
     @property
     def own_s(self) -> float | None:
-        """The moment on the robot's own clock (s): the one that is never set, if told.
+        """Time on the robot's own clock (s): monotonic if sent, else the stamp.
 
-        Comparable among topics of one boot alone.
+        Comparable among the topics of one boot only.
         """
         return self.stamp_s if self.mono is None else self.mono
 
 
 UNKNOWN_ORIGIN = Origin()
-"""Of an observation whose sender tells none, or before it is counted."""
+"""Origin of an observation that is not counted, or not yet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,8 +118,8 @@ class Observation:
     """Something that a robot or a device observed.
 
     Attributes:
-        robot_id: Who says so; empty: no robot.
-        origin: Which of its messages it was.
+        robot_id: The robot that sent it; empty: no robot did.
+        origin: Identity of the message.
     """
 
     __pydantic_config__ = ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False)
@@ -129,7 +133,7 @@ def _or_none(text: str | None) -> str | None:
 
 
 FrameName = Annotated[Text, AfterValidator(_or_none)]
-"""As sent; empty: none."""
+"""Name of a frame as sent; an empty name is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +141,9 @@ class Odometry(Observation):
     """Pose of ``base_link`` in ``map`` and the twist in ``base_link``.
 
     Attributes:
-        frame_id: Of the pose, as sent; None: without one, which is ``map``.
+        pose: Pose of ``base_link`` in ``map`` (m, rad).
+        twist: Twist in ``base_link`` (m/s, rad/s).
+        frame_id: Frame of the pose as sent; None: none was sent, which means ``map``.
     """
 
     pose: Annotated[Pose2D, IN_MESSAGE]
@@ -145,17 +151,18 @@ class Odometry(Observation):
     frame_id: Annotated[FrameName | None, IF_ANY] = None
 
 
+# Without equality, since arrays compare element by element.
 @dataclass(frozen=True, slots=True, eq=False)
 class LaserScan(Observation):
-    """One sweep, field for field ``sensor_msgs/LaserScan``.
+    """One sweep, with the fields of ``sensor_msgs/LaserScan``.
 
     Attributes:
         angle_min: Angle of ``ranges[0]`` about the sensor's z axis (rad).
         angle_increment: Angle between neighbours (rad).
-        range_min: Shorter returns are the robot itself (m).
+        range_min: Bound below which returns are of the robot itself (m).
         range_max: Longest range that counts (m).
         mount: The sensor's pose in ``base_link``.
-        ranges: Shape (n,), float32 (m); ``inf`` where nothing came back.
+        ranges: Shape (n,), float32 (m); ``inf``: nothing came back.
     """
 
     angle_min: Radians
@@ -166,7 +173,7 @@ class LaserScan(Observation):
     ranges: NDArray[np.float32]
 
     def returns(self) -> NDArray[np.bool_]:
-        """Which ranges count: what came back from farther than the robot itself."""
+        """Mask of the ranges that count: in range, and not of the robot itself."""
         ranges = self.ranges
         return (
             np.isfinite(ranges)
@@ -175,11 +182,11 @@ class LaserScan(Observation):
         )
 
     def speaks(self) -> NDArray[np.bool_]:
-        """Which beams say something: they ended in range, or found nothing in it."""
+        """Mask of the beams that say something: a return, or nothing in range."""
         return self.returns() | np.isposinf(self.ranges)
 
     def points(self, pose: Pose2D) -> NDArray[np.float32]:
-        """Returns that count, in the frame that ``pose`` is in; shape (m, 2), (m)."""
+        """Returns that count, in the frame of ``pose``; shape (m, 2), (m)."""
         ranges, counts = self.ranges, self.returns()
         sensor = pose.compose(self.mount)
         angles = (
@@ -193,7 +200,7 @@ class LaserScan(Observation):
 
 
 def _named(class_id: object) -> object:
-    """Some detectors number their classes."""
+    """The class as text, since some detectors number their classes."""
     return str(class_id) if type(class_id) is int else class_id
 
 
@@ -208,10 +215,11 @@ class Detection:
     """One box that a robot's detector reported.
 
     Attributes:
-        class_id: As sent (``farmer``); the rule's class comes from the alias table.
-        probability: 0 to 1.
-        box: In ``frame_id``.
-        frame_id: As sent (``iveg.domain.frames`` resolves it); None: without one.
+        class_id: Class as sent (``farmer``); the alias table gives the rule's class.
+        probability: Confidence, 0 to 1.
+        box: Box in ``frame_id`` (m).
+        frame_id: Frame as sent (``iveg.domain.frames`` resolves it); None: not sent.
+        det_id: Id that the detector gave it; None: not sent.
     """
 
     class_id: Annotated[Text, BeforeValidator(_named)]
@@ -226,19 +234,31 @@ class DetectionFrame(Observation):
     """All detections of one picture; an empty frame means that nothing was seen.
 
     Attributes:
+        detections: The boxes that could be used.
         unread: Class of each box that could not be used (no confidence, no position);
-            None where that is not known either.
-        detector: Name of the network, by which it is calibrated; None: not told.
+            None in it: not even the class is known.
+        detector: Name of the network; None: not sent.
     """
 
     detections: tuple[Detection, ...]
     unread: tuple[str | None, ...] = ()
     detector: Text | None = None
 
+    @property
+    def detector_name(self) -> str:
+        """Name by which its words are known: the robot's where it has none."""
+        return self.detector or self.robot_id
+
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """A reason why a robot may not move (docs/safety.md, "Holds")."""
+    """A reason why a robot may not move (docs/safety.md, "Holds").
+
+    Attributes:
+        id: Its id, never used again.
+        source: Cause of the hold.
+        ack: Side that may lift it: iVeg, somebody at the robot, or the robot itself.
+    """
 
     id: Text
     source: Literal["iveg", "boot", "hw", "bumper", "link"]
@@ -251,8 +271,8 @@ class RobotFault:
 
     Attributes:
         code: A short, stable name, such as ``no_transform``.
-        about: Which frames or topic.
-        for_s: For how long (s); None where that is not known.
+        about: The frames or the topic.
+        for_s: Duration (s); None: unknown.
     """
 
     code: Text
@@ -265,8 +285,8 @@ class Unplaced(Observation):
     """A measurement whose place in ``map`` is not known.
 
     Attributes:
-        kind: What would have been sent.
-        twist: Of odometry; a speed needs no place.
+        kind: Kind of the observation that it would have been.
+        twist: Twist of odometry, since a speed needs no place.
     """
 
     kind: Literal["odometry", "scan"]
@@ -275,12 +295,12 @@ class Unplaced(Observation):
 
 @dataclass(frozen=True, slots=True)
 class ReportedObstacle:
-    """Something that a robot's laser sees near it and nothing explains.
+    """An obstacle near a robot that its laser sees and nothing explains.
 
     Attributes:
         x: Its middle in ``map`` (m); ``y`` likewise.
-        width_m: From its first return to its last (m).
-        moved: It walks, or has walked since the laser saw it first.
+        width_m: Distance from its first return to its last (m).
+        moved: Whether it has walked since the laser saw it first.
     """
 
     x: Annotated[Metres, digits(2)]
@@ -290,13 +310,13 @@ class ReportedObstacle:
 
 
 def _is_true(value: object) -> bool:
-    """A wish that cannot be read is none."""
+    """Whether a value is exactly true; an unreadable value is false."""
     return value is True
 
 
 Reason = Annotated[
     Text,
-    one_of(
+    known_text(
         "clear",
         "person",
         "robot",
@@ -316,14 +336,19 @@ class SafetyReport(Observation):
     """The speed factor that the robot applies and its reasons, as it reports them.
 
     Attributes:
-        cause: Person, robot or hold that the factor is for.
-        released: The last 64 hold ids that were released.
-        challenge: Must be echoed by a release or resume.
-        linear: Measured speed (m/s); ``angular`` (rad/s).
-        feedback_age_s: How old the newest feedback is that the robot acts on (s).
-        faults: What it finds wrong with its own data.
-        peer_scans: It asks for scans of its peers.
-        obstacle: What its laser sees near it, whatever it is slow for.
+        speed_factor: Factor from 0 to 1.
+        reason: Reason of the factor.
+        cause: Person, robot or hold that is the cause.
+        decision_id: Decision of iVeg that the factor follows; None: it follows none.
+        holds: All present holds.
+        released: Ids of the last 64 holds that were released.
+        challenge: Random text that a release or resume must echo.
+        linear: Measured speed (m/s).
+        angular: Measured turn rate (rad/s).
+        feedback_age_s: Age of the newest feedback that the robot acts on (s).
+        faults: Faults of its own data.
+        peer_scans: Whether it wants scans of its peers.
+        obstacle: The obstacle that its laser sees, whatever the reason is.
     """
 
     speed_factor: Annotated[float, Strict(), Field(ge=0, le=1)]
@@ -342,7 +367,7 @@ class SafetyReport(Observation):
 
 
 def _level(point: object) -> object:
-    """A point of a path may have a height, which is left."""
+    """A point of a path without its height."""
     return point[:2] if isinstance(point, list) and len(point) == 3 else point
 
 
@@ -361,7 +386,7 @@ class Navigation(Observation):
 
 @dataclass(frozen=True, slots=True)
 class Battery(Observation):
-    """The battery, as the robot said last."""
+    """Battery of a robot, by its newest message."""
 
     percentage: Annotated[float | None, Quantity("0–1", "charge", 0, 1)] = None
     charging: Annotated[bool | None, Quantity("–", "whether it charges")] = None
@@ -381,13 +406,19 @@ class CommandAnswer(Observation):
     """The robot's own answer on ``cmdexe`` (or ``cmd_info``).
 
     Attributes:
-        attempt: Of the release or resume that is answered; None for a STOP.
+        id: The hold, for a STOP; None: not sent.
+        result: ``LATCHED``, ``RELEASED``, ``RESUMED`` or ``REFUSED``.
+        holds: All holds after the order.
+        challenge: The challenge after the order.
+        linear: Measured speed (m/s).
+        why: Reason of a refusal.
+        attempt: Id of the release or resume that is answered; None: it was a STOP.
     """
 
     id: Annotated[Text | None, Field(default=None)]
     result: Annotated[
         Text,
-        one_of("LATCHED", "RELEASED", "RESUMED", "REFUSED"),
+        known_text("LATCHED", "RELEASED", "RESUMED", "REFUSED"),
         Field(alias="r"),
     ]
     holds: Holds = ()
@@ -399,18 +430,18 @@ class CommandAnswer(Observation):
 
 @dataclass(frozen=True, slots=True)
 class GoalAnswer(Observation):
-    """The robot's own word of a goal, on ``cmdexe`` (or ``goal_info``).
+    """The robot's own answer about a goal, on ``cmdexe`` (or ``goal_info``).
 
     Attributes:
-        id: Of the goal.
+        id: Id of the goal.
         result: ``ACCEPTED``, ``REFUSED``, ``REACHED`` or ``DROPPED``.
-        why: Code of the reason of a refusal, or for which it was dropped.
+        why: Code of the reason why it was refused or dropped.
     """
 
     id: Text
     result: Annotated[
         Text,
-        one_of("ACCEPTED", "REFUSED", "REACHED", "DROPPED"),
+        known_text("ACCEPTED", "REFUSED", "REACHED", "DROPPED"),
         Field(alias="r"),
     ]
     why: Text | None = None
@@ -418,7 +449,10 @@ class GoalAnswer(Observation):
 
 @dataclass(frozen=True, slots=True)
 class Climate(Observation):
-    """Air in the greenhouse: °C, 0–1, ppm; None where a sensor is silent."""
+    """Air in the greenhouse: temperature (°C), humidity (0–1), CO₂ (ppm).
+
+    A value is None while its sensor is silent.
+    """
 
     robot_id: str = field(default="", init=False)
     origin: Origin = field(default=UNKNOWN_ORIGIN, init=False)
@@ -431,9 +465,9 @@ class Climate(Observation):
 
 @dataclass(frozen=True, slots=True)
 class EntityReading:
-    """Attributes of other equipment as Orion tells them, still unread.
+    """Attributes of other equipment as Orion sends them, still unread.
 
-    It is of no robot and waits in no queue of theirs (``pipeline.equipment``).
+    It belongs to no robot and waits in no robot's queue (``comfort.equipment``).
     """
 
     entity_id: str
@@ -442,20 +476,33 @@ class EntityReading:
 
 @dataclass(frozen=True, slots=True)
 class HeartbeatProbe(Observation):
-    """iVeg's own heartbeat probe after its way through the whole data path."""
+    """iVeg's own heartbeat probe, back from the whole data path."""
 
     robot_id: str = field(default="", init=False)
 
 
 @dataclass(frozen=True, slots=True)
 class RefusedFrame(Observation):
-    """A detection frame that came and could not be read: somebody may be in it."""
+    """A detection frame that could not be read: somebody may be in it."""
 
     origin: Origin = field(default=UNKNOWN_ORIGIN, init=False)
 
 
+@dataclass(frozen=True, slots=True)
+class Copy(Observation):
+    """Another copy of a message that was taken already; only its arrival counts.
+
+    Attributes:
+        kind: Kind of the message.
+    """
+
+    kind: type[Observation]
+
+
 def kind_of(observation: Observation) -> type[Observation]:
-    """The stream of its robot that an observation belongs to."""
+    """Kind of the stream that an observation belongs to."""
+    if isinstance(observation, Copy):
+        return observation.kind
     if isinstance(observation, RefusedFrame):
         return DetectionFrame
     return type(observation)
@@ -466,15 +513,18 @@ class Received:
     """An observation with the moment and the transport that brought it.
 
     Attributes:
-        asked: It is Orion's answer to a question, so nobody knows how old it is.
-        sparse: Its topic has two safety reports a second; else ten while a robot holds.
-        alone: It is the only one of its boot so far, and came through FIWARE: a broker
-            may have kept it for an agent that has just started.
+        observation: The observation.
+        at: Time of arrival.
+        transport: The transport that brought it.
+        is_query_answer: Whether Orion answered a query with it: its age is unknown.
+        sparse: Whether its topic has two safety reports a second, not ten.
+        alone: Whether it came through FIWARE and is the first of its boot: a broker may
+            have retained it for an agent that has just started.
     """
 
     observation: Observation
     at: Instant
     transport: TransportId = FIWARE.id
-    asked: bool = False
+    is_query_answer: bool = False
     sparse: bool = True
     alone: bool = False

@@ -1,14 +1,18 @@
-"""Parameters of the detection rule: one row each, from which all else follows.
+"""Parameters of the detection rule: one row each.
 
-Settings, REST, stored lines, the strictest of several rules, audit, evidence of
-decisions, log, what robots are sent, and the form on the page with its question where a
-change protects less are read from here.  A row's texts are ``rule.part.{word}`` and
-``lowering.{word}`` of the translations.
+These read the table: settings, REST, stored lines, the strictest of several rules,
+audit, evidence of decisions, log, and the feedback to robots.  So does the form on the
+page, which asks again where a change protects less.  The texts of a row are
+``rule.part.{word}`` and ``lowering.{word}`` of the translations.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Final, Literal, get_args
+from typing import Annotated, Any, Final, Literal, get_args
+
+from pydantic import Field, FiniteFloat, TypeAdapter
+from pydantic.dataclasses import dataclass as checked_dataclass
 
 from iveg.domain.limits import LIMITS
 
@@ -19,109 +23,115 @@ Unit = Literal["share", "m", "s", "switch"]
 FORESIGHT_LEAST_S: Final = 0.5
 """The shortest horizon of foresight (s)."""
 FORESIGHT_MOST_S: Final = 3.0
-"""The farthest (s): so far it was measured how much comes true."""
+"""The longest horizon (s), up to which forecasts were measured."""
 
 
 @dataclass(frozen=True, slots=True)
 class ByClass:
-    """A value for every class, and others for some of them."""
+    """A value for every class, with exceptions for some classes."""
 
     every: float
     by_class: Mapping[Class, float] = field(default_factory=dict)
 
-    def of(self, class_: Class | None) -> float:
-        """The value of a canonical class; None stands for any other class."""
+    def for_class(self, class_: Class | None) -> float:
+        """The value for a canonical class; None: any other class."""
         return self.every if class_ is None else self.by_class.get(class_, self.every)
 
     @property
     def values(self) -> tuple[float, ...]:
-        """All that stand in it."""
+        """All values in it."""
         return self.every, *self.by_class.values()
 
 
 Value = float | ByClass
-"""A switch is a float, too: 0 or 1, as Python counts a bool."""
+"""Value of a parameter; a switch is a float as well, 0 or 1."""
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z_]*$")]
+_UNIQUE: Final = ("name", "key", "class_key", "variable")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
     """One row.
 
     Attributes:
-        name: Field of ``Parameters``; key of stored lines and of evidence.
-        default: Unless a setting says otherwise.
-        key: In REST and the audit.
-        class_key: In REST and stored lines, key of values by class; None: one for all.
-        least: Least value; ``most`` likewise the greatest.
-        protects: What a greater value does.
-        variable: Name of its setting; ``says`` explains it.
-        word: Of its texts.
+        name: Field of ``Parameters``; key in stored lines and evidence.
+        default: Value without a setting.
+        key: Key in REST and the audit.
+        class_key: Key of values by class, in REST and stored lines; None: all classes
+            have one value.
+        unit: Unit of the value.
+        least: Least value.
+        most: Greatest value.
+        protects: Whether a greater value protects more or less.
+        variable: Name of its setting.
+        says: Explanation of its setting.
+        word: Last part of the keys of its texts.
         robots: Whether robots are sent it.
     """
 
-    name: str
-    default: Value
-    key: str
-    class_key: str | None
+    name: Name
+    default: bool | Value
+    key: Name
+    class_key: Name | None
     unit: Unit
-    least: float
-    most: float
+    least: FiniteFloat
+    most: FiniteFloat
     protects: Literal["more", "less"]
-    variable: str
+    variable: Annotated[str, Field(pattern=r"^IVEG_[A-Z_]+$")]
     says: str
-    word: str
+    word: Name
     robots: bool
 
     def __post_init__(self) -> None:
-        """Refuse a row that cannot be meant.
-
-        Raises:
-            ValueError: with the name of the row.
-        """
-        is_by_class = isinstance(self.default, ByClass)
-        if is_by_class != (self.class_key is not None):
-            raise ValueError(f"rule parameter {self.name}: class_key and default")
-        if not all(self.least <= one <= self.most for one in values_of(self.default)):
-            raise ValueError(f"rule parameter {self.name}: default out of bounds")
+        """Check the default.  Raises ValueError."""
+        if not (
+            isinstance(self.default, ByClass) == (self.class_key is not None)
+            and isinstance(self.default, bool) == (self.unit == "switch")
+            and self.least <= min(all_values(self.default))
+            and max(all_values(self.default)) <= self.most
+        ):
+            raise ValueError(f"default {self.default} does not fit its row")
 
     def written(self, value: Value, key: str) -> dict[str, object]:
-        """A value under its keys; ``key``: that of the value for every class."""
+        """A value under its keys; ``key``: key of the value for every class."""
         if isinstance(value, ByClass) and self.class_key is not None:
             return {key: value.every, self.class_key: dict(value.by_class)}
         return {key: value}
 
-    def read(self, told: Mapping[str, Any], before: Value, key: str) -> Value:
-        """The value under its keys; what is missing or None stays as it was before."""
-        every = told.get(key)
+    def read(self, document: Mapping[str, Any], before: Value, key: str) -> Value:
+        """The value under its keys; a missing part or None stays as ``before``."""
+        every = document.get(key)
         if not isinstance(before, ByClass):
             return before if every is None else every
-        by_class = told.get(self.class_key or "")
+        by_class = document.get(self.class_key or "")
         return ByClass(
             before.every if every is None else every,
             before.by_class if by_class is None else by_class,
         )
 
     def strictest(self, several: Iterable[Value]) -> Value:
-        """The value that protects as much as each of them, for any class."""
-        all_ = [one for value in several for one in values_of(value)]
-        found = max(all_) if self.protects == "more" else min(all_)
-        return ByClass(found) if self.class_key is not None else found
+        """The most protective of several values, for any class."""
+        numbers = [number for value in several for number in all_values(value)]
+        strictest = max(numbers) if self.protects == "more" else min(numbers)
+        return ByClass(strictest) if self.class_key is not None else strictest
 
 
-def values_of(value: Value) -> tuple[float, ...]:
-    """All numbers that stand in a value."""
+def all_values(value: Value) -> tuple[float, ...]:
+    """All numbers in a value."""
     return value.values if isinstance(value, ByClass) else (value,)
 
 
 def _row(default: Any, **facts: Any) -> Any:
     """A row of the table."""
-    row = {"default": default, "class_key": None, "robots": False, **facts}
-    return field(default=default, metadata=row)
+    return field(
+        default=default,
+        metadata={"default": default, "class_key": None, "robots": False, **facts},
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameters:
-    """The table: each field is a parameter, its metadata the rest of its row."""
+    """The table: a field is a parameter, and its metadata are the rest of its row."""
 
     threshold: ByClass = _row(
         ByClass(LIMITS.detection_threshold),
@@ -172,22 +182,38 @@ class Parameters:
     )
 
 
-PARAMETERS: Final = tuple(
-    Parameter(name=one.name, **one.metadata) for one in fields(Parameters)
-)
-ROBOTS_HEAR: Final = tuple(one for one in PARAMETERS if one.robots)
+_ROWS = TypeAdapter(dict[str, Parameter])
+
+
+def parameters_of(table: Any) -> tuple[Parameter, ...]:
+    """The rows of a table.
+
+    Raises:
+        ValueError: with the name of a wrong row.
+    """
+    rows = {row.name: {"name": row.name, **row.metadata} for row in fields(table)}
+    used = Counter(
+        name for row in rows.values() for name in {row.get(part) for part in _UNIQUE}
+    )
+    if several := [name for name, uses in used.items() if name and uses > 1]:
+        raise ValueError(f"rule parameters share {several}")
+    return tuple(_ROWS.validate_python(rows).values())
+
+
+PARAMETERS: Final = parameters_of(Parameters)
+SENT_PARAMETERS: Final = tuple(row for row in PARAMETERS if row.robots)
 
 Sent = Mapping[str, Mapping[Class, float]]
-"""Parameter → class → value, as robots are sent it."""
+"""Parameter → class → value, as in the feedback to robots."""
 
 
 def by_keys(parameters: Parameters) -> dict[str, object]:
-    """All values, as REST has them."""
+    """All values under their keys in REST."""
     return _written(parameters, "key")
 
 
 def by_names(parameters: Parameters) -> dict[str, object]:
-    """All values, as stored lines have them."""
+    """All values under their keys in stored lines."""
     return _written(parameters, "name")
 
 
@@ -199,19 +225,23 @@ def _written(parameters: Parameters, key: Literal["key", "name"]) -> dict[str, o
 
 
 def for_class(parameters: Parameters, class_: Class) -> dict[str, float]:
-    """The values that count for a class, by name."""
-    return {row.name: _of(getattr(parameters, row.name), class_) for row in PARAMETERS}
-
-
-def sent_to_robots(parameters: Parameters) -> Sent:
-    """The values that robots are sent, of each class."""
+    """The values for a class, by name."""
     return {
-        row.name: {
-            class_: _of(getattr(parameters, row.name), class_) for class_ in CLASSES
-        }
-        for row in ROBOTS_HEAR
+        row.name: _for_class(getattr(parameters, row.name), class_)
+        for row in PARAMETERS
     }
 
 
-def _of(value: Value, class_: Class) -> float:
-    return value.of(class_) if isinstance(value, ByClass) else value
+def sent_to_robots(parameters: Parameters) -> Sent:
+    """The values that robots are sent, for each class."""
+    return {
+        row.name: {
+            class_: _for_class(getattr(parameters, row.name), class_)
+            for class_ in CLASSES
+        }
+        for row in SENT_PARAMETERS
+    }
+
+
+def _for_class(value: Value, class_: Class) -> float:
+    return value.for_class(class_) if isinstance(value, ByClass) else value

@@ -1,7 +1,7 @@
-"""A scan as peers are told of it: 72 beams all round, for their own costmaps.
+"""A scan as it is sent to peers: 72 beams all round, for their own costmaps.
 
-A beam is 5° wide and as long as the shortest ray in it, so that nothing is free that
-the laser did not see to be free; where any ray in it says nothing, it says nothing.
+A beam is 5° wide and as long as the shortest ray in it, so only places that the laser
+saw to be free are free.  If any ray in it says nothing, the beam says nothing.
 """
 
 import math
@@ -18,19 +18,20 @@ from iveg.domain.wire import MaxRange, Text, digits
 
 BEAMS: Final = 72
 PLACES: Final = 10
-"""Parts of a beam across, one of which its shortest ray was in."""
+"""Parts of a beam across; the message says in which part its shortest ray was."""
 OLDEST_S: Final = 2.0
+"""Greatest age of a scan that is sent (s)."""
 _WIDTH = math.tau / BEAMS
 _CENTIMETRE = 100.0
 _USED_FROM_M = 0.01
-"""A shorter beam says nothing."""
+"""Length below which a beam says nothing (m)."""
 _ROUNDED = 0.05
-"""Of the angle between two rays."""
+"""Rounding error of a driver, as a share of the angle between two rays (1)."""
 SAYS_NOTHING = np.float32(0.0)
 
 _Floats = NDArray[np.float32]
 _LONGEST_ROBOT_M = 5.0
-"""No robot is longer than twice this."""
+"""Greatest distance of a laser from ``base_link``, along x or y (m)."""
 
 
 def _on_a_robot(mount: Pose2D) -> Pose2D:
@@ -44,13 +45,13 @@ class PeerScan:
     """One message on ``/{robot_id}/iveg/peer_scan``.
 
     Attributes:
-        pose: Where ``base_link`` of the peer was, in ``map``.
+        pose: Pose of the peer in ``map``, when it scanned.
         age_s: Age of the scan when this was sent (s).
         mount: The laser's pose in ``base_link``.
         range_max: Longest range that counts (m).
-        ranges: Shape (72,) (m), the first beam from −π on; ``inf`` where nothing came
-            back, 0 where the beam says nothing.
-        places: Shape (72,): where across the beam its range was measured.
+        ranges: Shape (72,) (m), the first beam from −π on; ``inf``: nothing came back,
+            0: the beam says nothing.
+        places: Shape (72,): part of the beam in which its range was measured.
     """
 
     __pydantic_config__ = ConfigDict(arbitrary_types_allowed=True)
@@ -65,7 +66,7 @@ class PeerScan:
     places: NDArray[np.uint8]
 
     def ended(self) -> NDArray[np.bool_]:
-        """Which beams ended at something."""
+        """Mask of the beams that ended at something."""
         return (self.ranges >= _USED_FROM_M) & (self.ranges <= self.range_max)
 
     def returns(self) -> _Floats:
@@ -73,18 +74,26 @@ class PeerScan:
         sensor, ended = self.pose.compose(self.mount), self.ended()
         across = (self.places[ended] + 0.5) / PLACES
         bearing = sensor.yaw - math.pi + _WIDTH * (np.flatnonzero(ended) + across)
-        far = self.ranges[ended]
-        found = sensor.x + far * np.cos(bearing), sensor.y + far * np.sin(bearing)
-        return np.stack(found, axis=1).astype(np.float32)
+        lengths = self.ranges[ended]
+        return np.stack(
+            (
+                sensor.x + lengths * np.cos(bearing),
+                sensor.y + lengths * np.sin(bearing),
+            ),
+            axis=1,
+        ).astype(np.float32)
 
     def without(self, refused: NDArray[np.bool_]) -> "PeerScan":
-        """A copy in which beams say nothing whose return (m,) is refused."""
+        """A copy in which beams with a refused return say nothing.
+
+        ``refused``: Mask of the returns, shape (m,).
+        """
         ranges = self.ranges.copy()
         ranges[np.flatnonzero(self.ended())[refused]] = SAYS_NOTHING
         return replace(self, ranges=ranges)
 
     def scan(self) -> LaserScan:
-        """The beams as a sweep; what they ended at is in ``returns``."""
+        """The beams as a sweep; their exact returns are in ``returns``."""
         return LaserScan(
             self.robot_id,
             self.origin,
@@ -101,12 +110,13 @@ def peer_scan_of(scan: LaserScan, pose: Pose2D, age_s: float) -> PeerScan:
     """The message for peers about a scan that was taken at ``pose`` in ``map``."""
     bearing = _bearings(scan.angle_increment)
     ray = _nearest_rays(scan, bearing)
-    said = np.where(ray < 0, SAYS_NOTHING, _lengths(scan)[ray])
-    shortest = said.argmin(axis=1)[:, None]
-    ranges = np.take_along_axis(said, shortest, 1)[:, 0]
+    lengths = np.where(scan.speaks(), scan.ranges, SAYS_NOTHING)
+    beams = np.where(ray < 0, SAYS_NOTHING, lengths[ray])
+    shortest = beams.argmin(axis=1)[:, None]
+    ranges = np.take_along_axis(beams, shortest, 1)[:, 0]
     ray = np.take_along_axis(ray, shortest, 1)[:, 0]
     at = scan.angle_min + scan.angle_increment * ray - bearing[:, 0]
-    # The ray at an edge may lie just outside.
+    # The nearest ray of a bearing at an edge may lie just outside the beam.
     aside = (at + math.pi) % math.tau - math.pi
     places = np.clip(np.floor(aside / _WIDTH * PLACES), 0, PLACES - 1)
     return PeerScan(
@@ -116,6 +126,7 @@ def peer_scan_of(scan: LaserScan, pose: Pose2D, age_s: float) -> PeerScan:
         age_s,
         scan.mount,
         scan.range_max,
+        # Down, so that rounding frees nothing.
         (np.floor(ranges * _CENTIMETRE) / _CENTIMETRE).astype(np.float32),
         places.astype(np.uint8),
     )
@@ -129,18 +140,13 @@ def _bearings(increment: float) -> NDArray[np.float64]:
 
 
 def _nearest_rays(scan: LaserScan, bearing: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Number of the ray that each bearing is nearest to; -1 where none is near."""
+    """Number of the ray nearest to each bearing; -1: none is near."""
     step, turn = scan.angle_increment, math.tau / abs(scan.angle_increment)
     place = ((bearing - scan.angle_min) / step) % turn
     ray = np.floor(place + 0.5).astype(np.intp)
     ray[place > turn - 0.5] = 0
-    # A turn of rays closes but for what the driver's numbers were rounded by.
+    # A full turn of rays closes, but for the rounding of the driver's numbers.
     last = scan.ranges.size - 1
     ray[(ray > last) & (place < last + 0.5 + _ROUNDED)] = last
     ray[ray > last] = -1
     return ray
-
-
-def _lengths(scan: LaserScan) -> _Floats:
-    """Length of each ray (m); 0 where it says nothing."""
-    return np.where(scan.speaks(), scan.ranges, SAYS_NOTHING)

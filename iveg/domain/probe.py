@@ -1,19 +1,16 @@
 """Lag of the FIWARE data path, measured by iVeg's own heartbeat probes alone.
 
 A probe goes out every two seconds and comes back through broker, agent and Orion.  The
-newest that came back says how long the path took then; the oldest that is still out
-says how long it takes at least now, so that a path that stops is not taken for a fast
-one::
+newest returned probe gives the time of the path then.  The oldest probe that is still
+out gives a lower bound for now, so that a stopped path does not look fast::
 
     sent    1    2    3    4    5
     back    +1.0 +1.5                →  now, 4 s after 3 left: 4.0 s behind
 
-A probe that a later one has overtaken no longer counts: it may be lost for ever.
+A probe no longer counts once a later probe is back: it may be lost for ever.
 
-The hops of the data path.
-
-One vocabulary for both judges: the running health monitor judges hops by the heartbeat
-probe that passes them all, ``iveg doctor`` by using each once.
+``Hop`` names the hops of the path for both judges.  The health monitor judges them by
+the probe that passes them all, ``iveg doctor`` by using each once.
 """
 
 from collections import deque
@@ -24,9 +21,9 @@ from iveg.domain.observations import Instant, Origin
 
 
 class Hop(StrEnum):
-    """One hop, in the order in which a datum passes them.
+    """Hops, in the order in which a datum passes them.
 
-    The value is its id in JSON, metrics, errors and translations.
+    The value is the id in JSON, metrics, errors and translations.
     """
 
     MQTT = "mqtt"
@@ -43,16 +40,16 @@ class Hop(StrEnum):
 
 
 _KEPT = 600
-"""Probes remembered: twenty minutes of them, at one in two seconds."""
+"""Number of remembered probes: those of twenty minutes."""
 SLOW_S = 1.0
-"""A probe, a measure or an answer that takes longer is late (s)."""
+"""Time above which a probe, a measure or an answer is late (s)."""
 
 
 @dataclass(slots=True)
 class ProbeLag:
-    """Matches probes that come back with the moments when they left.
+    """Matches returned probes with the times at which they left.
 
-    All moments are iVeg's own monotonic clock; what a probe carries is never a time.
+    All times are those of iVeg's own monotonic clock; a probe carries none.
     """
 
     _sent: dict[Origin, float] = field(default_factory=dict)
@@ -61,33 +58,34 @@ class ProbeLag:
     _transit_s: float | None = None
 
     def sent(self, origin: Origin, now: Instant) -> None:
-        """A probe leaves."""
+        """Note a probe that leaves."""
         self._sent[_count(origin)] = now.mono
         self._out.append(now.mono)
         if len(self._sent) > _KEPT:
             del self._sent[next(iter(self._sent))]
 
     def returned(self, origin: Origin, now: Instant) -> None:
-        """A probe has come back; one of an earlier life of iVeg proves nothing."""
-        left = self.sent_at(origin)
-        if left is None or left <= self._newest:
+        """Note a returned probe; a probe of an earlier run is ignored."""
+        sent_at = self.sent_at(origin)
+        # A probe behind a later probe shows a lag that is over.
+        if sent_at is None or sent_at <= self._newest:
             return
-        self._newest = left
-        while self._out and self._out[0] <= left:
+        self._newest = sent_at
+        while self._out and self._out[0] <= sent_at:
             self._out.popleft()
-        self._transit_s = now.mono - left
+        self._transit_s = now.mono - sent_at
 
     def sent_at(self, origin: Origin) -> float | None:
-        """When this probe left (monotonic, s); None for one that is not ours."""
+        """Departure of a probe (monotonic, s); None for a probe of another run."""
         return self._sent.get(_count(origin))
 
     @property
     def is_known(self) -> bool:
-        """Whether a probe has come back; until then ``lag`` only says "at least"."""
+        """Whether a probe has come back; until then ``lag`` is a lower bound."""
         return self._transit_s is not None
 
     def has_passed(self, sent_at: float) -> bool:
-        """Whether a probe that left then (monotonic, s), or a later one, came back."""
+        """Whether a probe of ``sent_at`` (monotonic, s) or a later one came back."""
         return sent_at <= self._newest
 
     @property
@@ -104,17 +102,18 @@ class ProbeLag:
 
 
 def lag_in_words(lag_s: float) -> str:
-    """A lag as the log, programs and ``iveg doctor`` say it."""
+    """Sentence for a lag (s), for the log, programs and ``iveg doctor``."""
     late = f"{lag_s:.0f}" if lag_s >= 10.0 else f"{lag_s:.1f}"
     return f"measures reach Orion {late} s late"
 
 
 def stopped_in_words(lag_s: float | None) -> str:
-    """Sentence that nothing passes, and for how long where a probe tells (s)."""
+    """Sentence for a stopped path, with the lag where known (s)."""
     for_s = "" if lag_s is None else f", for {lag_s:.0f} s by now"
     return f"measures do not reach Orion{for_s}"
 
 
 def _count(origin: Origin) -> Origin:
-    """Identity of a probe; stamps may be reprinted on the way."""
+    """Identity of a probe."""
+    # FIWARE may print a stamp in another form, so stamps are left out.
     return Origin(origin.boot, origin.seq)

@@ -1,4 +1,4 @@
-"""The quantities of a message: declared once, at the member that holds the value."""
+"""Quantities of a message: each declared once, at the member that holds the value."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,12 +10,12 @@ from pydantic import Strict
 
 @dataclass(frozen=True, slots=True)
 class Quantity(GroupedMetadata):
-    """Unit, meaning and bounds of one member of a message; None: not known.
+    """Unit, meaning and bounds of one member of a message.
 
     Attributes:
-        unit: SI, or such as ``0–1``; ``–``: none.
-        least: Smallest value that is read; a smaller one is refused.
-        most: Greatest value that is read.
+        unit: SI unit, or a range such as ``0–1``; ``–``: none.
+        least: Smallest accepted value; None: no bound.
+        most: Greatest accepted value; None: no bound.
     """
 
     unit: str
@@ -24,7 +24,8 @@ class Quantity(GroupedMetadata):
     most: float | None = None
 
     def __iter__(self) -> Iterator[object]:
-        """Checks of a value that is read."""
+        """Checks of a value by pydantic."""
+        # A text or truth value in place of a number is another program's mistake.
         yield Strict()
         if self.least is not None:
             yield Ge(self.least)
@@ -36,9 +37,9 @@ _QUANTITIES: dict[type, dict[str, Quantity]] = {}
 
 
 def quantities_of(message: type) -> dict[str, Quantity]:
-    """The quantities of a message, by name.
+    """Quantities of a message, by name.
 
-    Asked for each robot in each frame of a page, so they are looked up once.
+    Every frame of a page needs them for each robot, so they are looked up once.
     """
     if message not in _QUANTITIES:
         _QUANTITIES[message] = {
@@ -51,13 +52,13 @@ def quantities_of(message: type) -> dict[str, Quantity]:
 
 
 def flags_of(message: type) -> list[str]:
-    """The quantities of a small sensor that are true or false, by name."""
+    """Names of the quantities of a small sensor that are true or false."""
     types = get_type_hints(message)
     return [name for name in quantities_of(message) if types[name] == bool | None]
 
 
 def value_of(observation: object) -> dict[str, Any]:
-    """Values of a small sensor, by name."""
+    """Values of a small sensor, by name of the quantity."""
     return {
         name: getattr(observation, name) for name in quantities_of(type(observation))
     }

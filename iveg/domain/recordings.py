@@ -1,6 +1,6 @@
-"""Recordings as files, and which of them go."""
+"""Recordings as files, and the limits of their number and size."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 
@@ -9,48 +9,45 @@ class RecordingFile:
     """One recording.
 
     Attributes:
-        name: Of its file, which begins with its first moment (UTC) and sorts by it.
-        size: Bytes.
+        name: Name of its file; begins with its first moment (UTC) and sorts by it.
+        size: Size (bytes).
         is_open: Whether it is still being written.
-        changed: When it was written last (Unix s).
+        changed_at: Time of the newest write (Unix s).
     """
 
     name: str
     size: int
     is_open: bool
-    changed: float
+    changed_at: float
 
     @property
     def day(self) -> str:
-        """The day of its first moment (UTC)."""
+        """Day of its first moment (UTC)."""
         return self.name[: len("2026-11-24")]
 
 
 @dataclass(frozen=True)
 class RecordingLimits:
-    """Bounds of what is kept; 0: without this limit.
+    """Limits of stored recordings; 0: no limit.
 
     Attributes:
-        days: Days with a recording, the newest first.  A clock that is wrong by years
-            takes one of them, not all.
-        most_bytes: Of all files.
+        days: Number of days with a recording.  A clock that is wrong by years costs one
+            of them, not all.
+        most_bytes: Size of all files (bytes).
     """
 
-    days: int = 7
-    most_bytes: int = 5 * 10**9
+    days: int
+    most_bytes: int
 
 
 def superfluous(
     files: Iterable[RecordingFile], limits: RecordingLimits
-) -> Sequence[RecordingFile]:
-    """Files that are over the limits; never the one that is written."""
+) -> Iterator[RecordingFile]:
+    """Files beyond the limits, newest first; never a file that is written."""
     days, size = set[str](), 0
-    gone = []
     for file in sorted(files, key=lambda file: file.name, reverse=True):
         days.add(file.day)
         size += file.size
         is_outdated = 0 < limits.days < len(days)
-        is_over = is_outdated or 0 < limits.most_bytes < size
-        if is_over and not file.is_open:
-            gone.append(file)
-    return gone
+        if (is_outdated or 0 < limits.most_bytes < size) and not file.is_open:
+            yield file

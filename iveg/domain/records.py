@@ -1,12 +1,12 @@
-"""Rows of the history, each declared once: one frozen value each.
+"""Rows of the history: one frozen value for each, declared once.
 
-A column's meaning stands beside it.  From these declarations follow the tables
+Each column is declared with its meaning.  From these declarations follow the tables
 (``adapters.history.tables``), the keys of REST and NDJSON (``models``), the columns of
 CSV and their page (``models.dictionary``).
 
 All times are Unix seconds UTC, positions are in ``map`` (m), speeds in m/s and rad/s.
-A decision, a command and an alert change state: a later record with the same id takes
-the place of the earlier one.  The other records are facts that are only ever added.
+A decision, a command and an alert change their state: a later record with the same id
+replaces the earlier record.  All other records are facts, which are only added.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,9 +26,9 @@ from typing import (
 from iveg.domain.transports import TRANSPORTS, TransportId
 
 Json = Mapping[str, Any]
-"""An object: what JSON can hold, which the history keeps as such, not as text."""
+"""JSON object; the history stores it as JSON and not as text."""
 ByTransport = Mapping[TransportId, float]
-"""A time for each transport that has one (Unix s)."""
+"""Time by transport (Unix s); a transport without a time is absent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +36,11 @@ class Means:
     """Meaning of a column.
 
     Attributes:
-        means: In one sentence.
-        unit: Empty where it has none.
-        frame: Frame of coordinates; empty where it is no place.
-        clock: Whose clock it is by; empty where it is no time.
-        joins: How its rows find those of other lists.
+        means: Meaning in one sentence.
+        unit: Its unit; empty: none.
+        frame: Frame of its coordinates; empty: no place.
+        clock: Clock of its times; empty: no time.
+        joins: Columns of other lists that it joins.
     """
 
     means: str
@@ -54,20 +54,29 @@ def _time(means: str, clock: str = "iVeg") -> Means:
     return Means(means, clock=clock)
 
 
-_ROBOT = Means(
-    "The robot.", joins="odometry: the newest `at` not after it, of the same `robot_id`"
-)
-_PERSON = Means("The track.", joins="decisions, detections, tracks: `person_id`")
-_CLASS = Means("Canonical class; none: unknown to the table of classes.")
+_AT_THAT_TIME = "odometry: the newest `at` not after it, of the same `robot_id`"
+_Robot = Annotated[str, Means("The robot.", joins=_AT_THAT_TIME)]
+_RobotIfAny = Annotated[
+    str | None, Means("The robot, if it is about one.", joins=_AT_THAT_TIME)
+]
+_Person = Annotated[
+    str | None, Means("The track.", joins="decisions, detections, tracks: `person_id`")
+]
+_Class = Annotated[
+    str | None, Means("Canonical class; none: unknown to the table of classes.")
+]
 _CLASS_ID = Means("Class as the detector said.")
 _CONFIDENCE = Means("Confidence of the detection.", "0 to 1")
-_PLACE = Means(
-    "Place of what was seen or judged; none where it is no longer kept.", "m", "map"
-)
-_REASON = Means("Why, as a code (docs/interfaces).")
-_KEY = Means("Template of its sentence; `slots` fill it.")
-_SLOTS = Means("Values of its sentence.")
-_ARRIVED = _time("It reached iVeg.")
+_Place = Annotated[
+    float | None,
+    Means(
+        "Place of what was seen or judged; none where it is no longer kept.", "m", "map"
+    ),
+]
+_Reason = Annotated[str | None, Means("Reason, as a code (docs/interfaces).")]
+_Key = Annotated[str, Means("Template of its sentence; `slots` fill it.")]
+_Slots = Annotated[Json, Means("Values of its sentence.")]
+_Arrived = Annotated[float, _time("It reached iVeg.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,23 +90,25 @@ class DecisionRecord:
         Literal["alert", "mandate"],
         Means("`alert` (somebody was confirmed) or `mandate` (a speed limit)."),
     ]
-    robot_id: Annotated[str, replace(_ROBOT, means="Robot that was limited, or saw.")]
+    robot_id: Annotated[
+        str, Means("Robot that was limited, or saw.", joins=_AT_THAT_TIME)
+    ]
     started_at: Annotated[float, _time("The rule fired.")]
-    person_id: Annotated[str | None, _PERSON] = None
+    person_id: _Person = None
     observer: Annotated[
         str | None, Means("Robot that saw it.", joins="`robot_id` of other lists")
     ] = None
-    class_: Annotated[str | None, _CLASS] = None
+    class_: _Class = None
     class_id: Annotated[str | None, _CLASS_ID] = None
     confidence: Annotated[float | None, _CONFIDENCE] = None
-    x: Annotated[float | None, _PLACE] = None
-    y: Annotated[float | None, _PLACE] = None
-    z: Annotated[float | None, _PLACE] = None
+    x: _Place = None
+    y: _Place = None
+    z: _Place = None
     distance_m: Annotated[
         float | None, Means("From the robot to the centre of the zone.", "m")
     ] = None
     speed_factor: Annotated[float | None, Means("The limit.", "0, 0.5 or 1")] = None
-    reason: Annotated[str | None, _REASON] = None
+    reason: _Reason = None
     rule_id: Annotated[str | None, Means("The rule.")] = None
     rule_version: Annotated[
         str | None, Means("Its version.", joins="GET /rule/versions: `version`")
@@ -125,13 +136,13 @@ class DecisionRecord:
 class DetectionRecord:
     """One box of one detection frame of one robot."""
 
-    at: Annotated[float, _ARRIVED]
-    robot_id: Annotated[str, _ROBOT]
+    at: _Arrived
+    robot_id: _Robot
     class_id: Annotated[str, _CLASS_ID]
     probability: Annotated[float, _CONFIDENCE]
-    x: Annotated[float | None, _PLACE] = None
-    y: Annotated[float | None, _PLACE] = None
-    z: Annotated[float | None, _PLACE] = None
+    x: _Place = None
+    y: _Place = None
+    z: _Place = None
     confident: Annotated[
         bool, Means("Whether it reached the threshold of the rule in force.")
     ]
@@ -141,8 +152,8 @@ class DetectionRecord:
     stamp: Annotated[
         str | None, _time("Time of the picture as the robot sent it.", "robot")
     ] = None
-    class_: Annotated[str | None, _CLASS] = None
-    person_id: Annotated[str | None, _PERSON] = None
+    class_: _Class = None
+    person_id: _Person = None
     box: Annotated[
         Json | None, Means("The box as sent, with its `frame_id`.", "m", "its own")
     ] = None
@@ -150,25 +161,25 @@ class DetectionRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandRecord:
-    """One STOP, release, resume or goal as it stands now.
+    """One STOP, release, resume or goal in its present state.
 
-    The state is one of the nine of the STOP machine, RUNNING at the end of a STOP,
-    REPLACED or EXPIRED where another command took over; of a goal one of
+    The state of a STOP is one of the nine of its machine, or RUNNING at its end.  A
+    command that another one took over is REPLACED or EXPIRED.  A goal has the states of
     ``domain.goals``.
     """
 
     command_id: Annotated[
         str, Means("The order (ULID).", joins="GET /commands/{id} has its steps")
     ]
-    robot_id: Annotated[str, _ROBOT]
+    robot_id: _Robot
     kind: Annotated[
-        Literal["stop", "release", "resume", "goal"], Means("What was asked.")
+        Literal["stop", "release", "resume", "goal"], Means("Kind of the order.")
     ]
     state: Annotated[
         str,
         Means("One of the nine states of STOP, `RUNNING`, `REPLACED` or `EXPIRED`."),
     ]
-    requested_by: Annotated[str, Means("Who asked first.")]
+    requested_by: Annotated[str, Means("Person who gave it first.")]
     requested_at: Annotated[float, _time("iVeg took the order.")]
     sent_at: Annotated[ByTransport, _time("This transport first took it.")] = field(
         default_factory=dict
@@ -181,9 +192,9 @@ class CommandRecord:
         float | None, Means("From the press to `standing_at`.", "ms")
     ] = None
     tries: Annotated[
-        int, Means("How often it was sent; all transports at once count once.")
+        int, Means("Number of times it was sent; all transports at once count once.")
     ] = 0
-    reason: Annotated[str | None, _REASON] = None
+    reason: _Reason = None
     pressed_at: Annotated[
         float | None, _time("A finger pressed.", "browser, corrected to iVeg's")
     ] = None
@@ -194,36 +205,34 @@ class CommandRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandEventRecord:
-    """One change of one command: a line of the audit trail, never altered."""
+    """One change of one command: a row of the audit, never altered."""
 
     command_id: Annotated[str, Means("The order.")]
-    robot_id: Annotated[str, _ROBOT]
+    robot_id: _Robot
     at: Annotated[float, _time("When.")]
     state: Annotated[str, Means("State from then on.")]
-    why: Annotated[str, Means("What led to it.")] = ""
+    why: Annotated[str, Means("Its cause.")] = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlertRecord:
-    """One alert to people, through its life (ISA-18.2)."""
+    """One alert to people, in its present state (ISA-18.2)."""
 
     alert_id: Annotated[str, Means("The alert.")]
     priority: Annotated[
         Literal["P1", "P2", "P3"],
         Means("The gravest of what holds and of what nobody has acknowledged."),
     ]
-    key: Annotated[str, _KEY]
+    key: _Key
     raised_at: Annotated[float, _time("The first time.")]
     last_raised_at: Annotated[float, _time("The newest time.")]
-    slots: Annotated[Json, _SLOTS] = field(default_factory=dict)
-    robot_id: Annotated[
-        str | None, replace(_ROBOT, means="The robot, if it is about one.")
-    ] = None
+    slots: _Slots = field(default_factory=dict)
+    robot_id: _RobotIfAny = None
     cleared_at: Annotated[float | None, _time("It was over; none: it is not.")] = None
     acknowledged_at: Annotated[float | None, _time("A person took note.")] = None
-    acknowledged_by: Annotated[str | None, Means("Who took note.")] = None
-    note: Annotated[str | None, Means("What they wrote.")] = None
-    count: Annotated[int, Means("How often it was raised while it lived.")] = 1
+    acknowledged_by: Annotated[str | None, Means("Person who took note.")] = None
+    note: Annotated[str | None, Means("Note of that person.")] = None
+    count: Annotated[int, Means("Number of its occurrences.")] = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -235,12 +244,10 @@ class LogRecord:
     kind: Annotated[
         str, Means("`detection`, `speed`, `command`, `link`, `alert` or `system`.")
     ]
-    key: Annotated[str, _KEY]
-    slots: Annotated[Json, _SLOTS] = field(default_factory=dict)
-    robot_id: Annotated[
-        str | None, replace(_ROBOT, means="The robot, if it is about one.")
-    ] = None
-    class_: Annotated[str | None, _CLASS] = None
+    key: _Key
+    slots: _Slots = field(default_factory=dict)
+    robot_id: _RobotIfAny = None
+    class_: _Class = None
     decision_id: Annotated[
         str | None, Means("The decision behind it.", joins="decisions: `decision_id`")
     ] = None
@@ -272,9 +279,11 @@ class OdometryRecord:
 class ClimateRecord:
     """One reading of the air in the greenhouse; None where a sensor was silent."""
 
-    at: Annotated[float, _ARRIVED]
-    temperature: Annotated[float | None, Means("Of the air.", "°C")] = None
-    relative_humidity: Annotated[float | None, Means("Of the air.", "0 to 1")] = None
+    at: _Arrived
+    temperature: Annotated[float | None, Means("Temperature of the air.", "°C")] = None
+    relative_humidity: Annotated[
+        float | None, Means("Relative humidity of the air.", "0 to 1")
+    ] = None
     co2: Annotated[float | None, Means("Carbon dioxide.", "ppm")] = None
 
 
@@ -282,8 +291,8 @@ class ClimateRecord:
 class ReadingRecord:
     """One reading of a small sensor of one robot."""
 
-    at: Annotated[float, _ARRIVED]
-    robot_id: Annotated[str, _ROBOT]
+    at: _Arrived
+    robot_id: _Robot
     kind: Annotated[str, Means("The sensor, such as `battery`.")]
     value: Annotated[Json, Means("Its quantities by name (docs/interfaces/mqtt.md).")]
 
@@ -292,7 +301,7 @@ class ReadingRecord:
 class MeasurementRecord:
     """One number of other equipment, as its tile shows it."""
 
-    at: Annotated[float, _ARRIVED]
+    at: _Arrived
     entity_id: Annotated[str, Means("Entity at Orion.")]
     attribute: Annotated[str, Means("Its attribute.")]
     value: Annotated[float, Means("The number.", "`unit`")]
@@ -301,7 +310,7 @@ class MeasurementRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AuditRecord:
-    """An act of somebody: a row of the audit, never changed (``domain.audit``)."""
+    """One act: a row of the audit, never altered (``domain.audit``)."""
 
     audit_id: Annotated[str, Means("The row; one offered twice is stored once.")]
     at: Annotated[float, _time("It happened.")]
@@ -309,12 +318,13 @@ class AuditRecord:
     name: Annotated[str, Means("Name of the account, as it was then.")]
     role: Annotated[str, Means("Their role then.")]
     method: Annotated[str, Means("Way of signing in.")]
-    action: Annotated[str, Means("What they did, such as `stop` or `sign_in_refused`.")]
+    action: Annotated[str, Means("The act, such as `stop` or `sign_in_refused`.")]
     subject: Annotated[
-        str, Means("To what, such as a robot's id; may be empty.", joins="`robot_id`")
+        str,
+        Means("Its object, such as a robot's id; may be empty.", joins="`robot_id`"),
     ] = ""
     details: Annotated[
-        str, Means("Status of the answer and what was asked, as JSON.")
+        str, Means("Status of the answer, and the request, as JSON.")
     ] = "{}"
 
 
@@ -330,13 +340,14 @@ LISTS: Final[Mapping[str, type[Record]]] = {
     "alerts": AlertRecord,
     "log": LogRecord,
     "detections": DetectionRecord,
+    # Tracks are the detections with a person.
     "tracks": DetectionRecord,
     "odometry": OdometryRecord,
     "readings": ReadingRecord,
     "measurements": MeasurementRecord,
     "audit": AuditRecord,
 }
-"""Lists that are shown and exported, by name."""
+"""Lists on pages and in exports, by name."""
 
 
 def is_telemetry(record: Record) -> bool:
@@ -345,7 +356,7 @@ def is_telemetry(record: Record) -> bool:
 
 
 def is_order(record: Record) -> bool:
-    """Whether a record is of an order: in the journal, and never dropped."""
+    """Whether a record is of an order, which is in the journal and never dropped."""
     return isinstance(record, Order)
 
 
@@ -365,11 +376,11 @@ class Column:
     """One column of a kind of row.
 
     Attributes:
-        name: In tables, files and JSON; ``key`` of the record, which is ``class_`` for
-            ``class``.
-        hint: Python's type of a value.
+        name: Its name in tables, files and JSON.
+        key: Its attribute of the record, which is ``class_`` for ``class``.
+        hint: Python type of a value.
         may_lack: Whether a row may be without it.
-        transport: The one whose time it is, of a time for each.
+        transport: Its transport, for a column of times by transport.
     """
 
     name: str
@@ -381,7 +392,7 @@ class Column:
     transport: TransportId | None = None
 
     def read(self, record: Record) -> Any:
-        """Its value of a row."""
+        """Value of the column in a row."""
         if self.transport is None:
             return getattr(record, self.key)
         return getattr(record, self.key).get(self.transport)
@@ -390,6 +401,7 @@ class Column:
 def _column(key: str, hint: Any) -> Column:
     plain, meaning = get_args(hint)
     parts = [plain]
+    # ``X | None`` has either origin, depending on what X is.
     if get_origin(plain) in (UnionType, Union):
         parts = list(get_args(plain))
     may_lack = type(None) in parts
@@ -401,20 +413,19 @@ def _column(key: str, hint: Any) -> Column:
 
 
 def _shown(column: Column) -> Iterator[Column]:
-    """The column; of times by transport one for each."""
+    """The column, or a column for each transport for times by transport."""
     if column.hint != ByTransport:
         yield column
         return
-    # Programs that read by position know this order.
-    for one in reversed(TRANSPORTS):
-        name = column.name.replace("_at", f"_{one.id}_at")
+    # Reversed, as programs that read by position rely on this order.
+    for transport in reversed(TRANSPORTS):
         yield replace(
             column,
-            name=name,
+            name=column.name.replace("_at", f"_{transport.id}_at"),
             hint=float | None,
             type="time",
             may_lack=True,
-            transport=one.id,
+            transport=transport.id,
         )
 
 
@@ -425,9 +436,9 @@ COLUMNS: Final[Mapping[type, tuple[Column, ...]]] = {
     )
     for kind in RECORD_TYPES
 }
-"""The columns of each kind of row, as the database has them."""
+"""Columns of each kind of row in the database."""
 SHOWN_COLUMNS: Final[Mapping[type, tuple[Column, ...]]] = {
-    kind: tuple(each for one in columns for each in _shown(one))
+    kind: tuple(shown for column in columns for shown in _shown(column))
     for kind, columns in COLUMNS.items()
 }
-"""The same as files and JSON have them."""
+"""Columns of each kind of row in files and JSON."""

@@ -1,8 +1,8 @@
-"""Horizons of the history, and room on its disk: what is kept how long.
+"""Horizons of the history, and room on its disk.
 
-Horizons are counted by the days that iVeg recorded, not by the clock alone.  A gap
-between two of them counts for three days at most: a clock that is wrong by years takes
-three days of what is kept and no more (docs/decisions/0006-days-that-were-recorded.md).
+Horizons count the days that iVeg recorded, not the clock alone.  A gap between two of
+them counts for three days at most: a clock that is wrong by years costs three days of
+the history (docs/decisions/0006-days-that-were-recorded.md).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,9 +12,11 @@ from typing import Literal
 from iveg.domain.events import Condition
 
 LEAST_BYTES, LEAST_SHARE = 10**9, 0.05
-"""Below the lesser of these the disk is low."""
+"""Free space (bytes, share of the disk) below the lesser of which the disk is low."""
 WELL_AGAIN = 1.2
-"""It is low until there is so many times that room."""
+"""Ratio to that space at which a low disk is well again."""
+LEAST_TO_RECORD, RECORDS_AGAIN = 20 * 10**9, 21 * 10**9
+"""Free space below which recordings pause, and at which they go on (bytes)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,8 +24,8 @@ class DiskSpace:
     """Room on the disk that holds the data (bytes).
 
     Attributes:
-        free: For iVeg's user.
-        total: Of the file system.
+        free: Space that iVeg's user may take.
+        total: Size of the file system.
     """
 
     free: int
@@ -31,35 +33,48 @@ class DiskSpace:
 
     @property
     def least(self) -> float:
-        """Below this the disk is low (bytes)."""
+        """Free space below which the disk is low (bytes)."""
         return min(LEAST_BYTES, LEAST_SHARE * self.total)
 
     def is_low(self, *, was_low: bool) -> bool:
-        """Whether it is low now; what was low is so until it is well again."""
+        """Whether the disk is low; a low disk stays so until ``WELL_AGAIN``."""
         return self.free < self.least * (WELL_AGAIN if was_low else 1.0)
 
-    def conditions(self, *, was_low: bool) -> Iterable[Condition]:
-        """A P2 while it is low."""
-        if self.is_low(was_low=was_low):
-            slots = {
-                "free_mb": self.free // 10**6,
-                "least_mb": int(self.least) // 10**6,
-            }
-            yield Condition("P2", "alert.disk_low", "disk", None, slots)
+    def is_short(self, *, was_short: bool) -> bool:
+        """Whether recordings pause; any low disk is short, too."""
+        return self.free < (RECORDS_AGAIN if was_short else LEAST_TO_RECORD)
+
+    def conditions(self, *, is_low: bool, is_paused: bool) -> Iterable[Condition]:
+        """A P2 while the disk is low, a P3 while recordings pause."""
+        if is_low:
+            yield Condition.filled(
+                "P2",
+                "alert.disk_low",
+                "disk",
+                free_mb=self.free // 10**6,
+                least_mb=int(self.least) // 10**6,
+            )
+        if is_paused:
+            yield Condition.filled(
+                "P3",
+                "alert.recordings_paused",
+                "disk",
+                free_gb=self.free // 10**9,
+            )
 
 
 DAY_S = 86400.0
 GAP_DAYS = 3
-"""A longer gap between two recorded days counts as this: a weekend counts in full."""
+"""Greatest count of a gap between recorded days: a weekend counts in full."""
 
 RetentionKind = Literal["positions", "telemetry", "decisions", "audit"]
 Cutoffs = Mapping[RetentionKind, float]
-"""Kind → the moment before which its rows may go (Unix s); kept for ever: none."""
+"""Time before which rows of a kind may go (Unix s); absent: kept for ever."""
 
 
 @dataclass(frozen=True, slots=True)
 class PurgeStep:
-    """One kind of row of one table: ``positions`` lose their places, others go."""
+    """One table and kind: ``positions`` lose their places, other rows are deleted."""
 
     kind: RetentionKind
     table: str
@@ -74,18 +89,18 @@ _PURGED: Mapping[RetentionKind, Sequence[str]] = {
 PURGE_STEPS = tuple(
     PurgeStep(kind, table) for kind, tables in _PURGED.items() for table in tables
 )
-"""In this order; docs/deployment.md, "How long the history keeps what"."""
+"""Steps in their order; docs/deployment.md, "How long the history keeps what"."""
 
 
 @dataclass(frozen=True)
 class Retention:
-    """Days that each kind of row is kept; 0: for ever.
+    """Horizon of each kind of row (days); 0: kept for ever.
 
     Attributes:
-        positions: Until people's places go from detections, decisions and log.
-        telemetry: Of odometry, detections, climate, readings and measurements.
-        decisions: Of decisions, commands, alerts and log.
-        audit: Of the audit and of the steps of commands.
+        positions: Places of people in detections, decisions and log.
+        telemetry: Odometry, detections, climate, readings and measurements.
+        decisions: Decisions, commands, alerts and log.
+        audit: The audit and the steps of commands.
     """
 
     positions: int = 7
@@ -95,17 +110,18 @@ class Retention:
 
     @property
     def longest(self) -> int:
-        """The longest of these horizons."""
+        """Longest horizon (days)."""
         return max(self.positions, self.telemetry, self.decisions, self.audit)
 
     def cutoffs(self, now: float, recorded: Sequence[int]) -> Cutoffs:
-        """The moments before which rows may go.
+        """Times before which rows may go.
 
         Args:
-            now: The wall clock (Unix s).
-            recorded: Days (UTC, since 1970) with a line in the log, newest first; at
-                least as many as the longest horizon, if there are.
+            now: Wall clock (Unix s).
+            recorded: Days (UTC, since 1970) with a line in the log, newest first; as
+                many as the longest horizon, or all.
         """
+        # Without a recorded day nothing goes: an empty log proves no age.
         return {
             kind: cutoff(days, now, recorded)
             for kind in _PURGED
@@ -114,19 +130,19 @@ class Retention:
 
 
 def cutoff(days: int, now: float, recorded: Sequence[int]) -> float:
-    """The moment since which this many days count, and have passed (Unix s).
+    """Start of the last ``days`` that count and have passed (Unix s).
 
     Args:
-        days: At least 1.
-        now: The wall clock (Unix s).
+        days: Number of days, at least 1.
+        now: Wall clock (Unix s).
         recorded: Days with a line in the log, newest first.
     """
-    first, left = int(now // DAY_S), days - 1
-    # Days that are still to come are of a clock that was ahead.
+    first, remaining = int(now // DAY_S), days - 1
+    # Days in the future come from a wrong clock: they count for nothing.
     for day in (day for day in recorded if day < first):
         counts = min(first - day, GAP_DAYS)
-        if left <= counts:
-            return min(now - days * DAY_S, (day + counts - left) * DAY_S)
-        first, left = day, left - counts
-    # Before the oldest line nobody knows which days were recorded: all of them.
-    return min(now - days * DAY_S, (first - left) * DAY_S)
+        if remaining <= counts:
+            return min(now - days * DAY_S, (day + counts - remaining) * DAY_S)
+        first, remaining = day, remaining - counts
+    # Before the oldest line it is unknown which days were recorded: all count.
+    return min(now - days * DAY_S, (first - remaining) * DAY_S)

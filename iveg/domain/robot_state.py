@@ -1,6 +1,6 @@
 """One robot as iVeg knows it: newest observations with their age, doubts and obedience.
 
-Nothing here reads a clock: ages come from the ``now`` that is handed in.
+Nothing here reads a clock: ages are measured from the argument ``now``.
 """
 
 from bisect import bisect_left
@@ -31,12 +31,12 @@ from iveg.domain.observations import (
     SafetyReport,
     kind_of,
 )
-from iveg.domain.stream_order import OrderVerdict, PresentBoot, StreamOrder
+from iveg.domain.stream_order import Freshness, PresentBoot, StreamOrder
 from iveg.domain.transports import FIWARE, TransportId
 
 
 class _Spell(NamedTuple):
-    """From the first to the newest contradiction of one code (monotonic, s)."""
+    """Time from the first to the newest contradiction of one code (monotonic, s)."""
 
     began: float
     newest: float
@@ -49,7 +49,7 @@ class Doubts:
     ::
 
         consistent ── contradicted for longer than a round trip ──> doubted
-                   <── nothing of it contradicted for a second ────
+                   <── no contradiction for a second ────
 
     A doubt lowers speeds and never raises one (docs/safety.md, "Clear").
     """
@@ -57,14 +57,14 @@ class Doubts:
     _spells: dict[str, _Spell] = field(default_factory=dict)
 
     def contradicted(self, code: str, now: Instant, lasted_s: float = 0.0) -> None:
-        """Note a contradiction of this code, which has lasted so long if it is new."""
+        """Note a contradiction; a new one has already lasted for ``lasted_s``."""
         spell = self._spells.get(code)
         if spell is None or self._is_over(spell, now):
             spell = _Spell(now.mono - lasted_s, now.mono)
         self._spells[code] = _Spell(spell.began, now.mono)
 
     def active(self, now: Instant) -> tuple[str, ...]:
-        """Codes of the doubts that count now, the oldest first."""
+        """Codes of the present doubts, the oldest first."""
         if not self._spells:
             return ()
         return tuple(
@@ -76,7 +76,7 @@ class Doubts:
 
     def is_open(self, now: Instant) -> bool:
         """Whether anything is contradicted, however shortly."""
-        return not all(self._is_over(one, now) for one in self._spells.values())
+        return not all(self._is_over(spell, now) for spell in self._spells.values())
 
     @staticmethod
     def _is_over(spell: _Spell, now: Instant) -> bool:
@@ -85,15 +85,18 @@ class Doubts:
 
 Link = Literal["UNKNOWN", "LIVE", "LATE", "LOST"]
 
-_HISTORY = 128
+_MOST_POSES = 128
+_FRAME_FRESH_S = 0.5
+"""Greatest age of a detection frame that proves a spot empty (s)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sensed:
-    """The newest observation of one kind, and the earliest moment it can be of.
+    """The newest observation of one kind, and the time of its measurement.
 
     Attributes:
-        at: None while nobody knows.
+        observation: The observation.
+        at: Lower bound of that time; None: unknown.
     """
 
     observation: Observation
@@ -105,32 +108,34 @@ class RobotState:
     """The known state of one robot.
 
     Attributes:
-        pose_at: The newest odometry was not measured before this moment (monotonic,
-            s): proven if the robot echoes, else estimated; None while neither is.
-        estimated_since: When odometry first came that proves nothing, if the newest
-            does not (monotonic, s).
-        unproven_since: When odometry first came whose age nobody knows (monotonic, s).
-        alive_since: When odometry came again after a silence (monotonic, s).
-        heard_at: Arrival of the newest message of any kind (monotonic, s).
-        heard_since: Since when odometry or reports have come without a silence, by the
-            moments at which they were measured; ``heard_until`` (monotonic, s).
-        detections_at: Like ``pose_at``, of the newest detection frame.
-        sighted_at: The same of the frame that was taken last, newest or not; where
-            nothing is known, the moment that is likely.
-        scan_received: Like ``pose_at``, of the newest scan; ``safety_received`` too.
-        detector: Whether its pictures are read whole.
-        refused: Whether a setting says that it is not heard.
-        unlabelled: Whether boxes of its newest frame with any came without a frame.
-        live_at: When a live safety node last spoke for a robot that the fleet calls a
+        pose_at: Lower bound of the time at which the newest odometry was measured
+            (monotonic, s): proven if the robot echoes, else estimated; None: unknown.
+        estimated_since: Arrival of the first odometry that proves no age; None: the
+            newest proves it (monotonic, s).
+        unproven_since: Arrival of the first odometry of unknown age; None: the newest
+            has an age (monotonic, s).
+        alive_since: Arrival of odometry after a silence (monotonic, s).
+        contact_since: Begin of the present series of odometry and reports without a
+            silence, by their times of measurement (monotonic, s).
+        contact_until: The newest of these times (monotonic, s).
+        detections_at: Like ``pose_at``, for the newest detection frame.
+        sighted_at: Like ``pose_at``, for the frame that came last, newest or not; the
+            likely time where no bound is known.
+        scan_received: Like ``pose_at``, for the newest scan.
+        safety_received: Like ``pose_at``, for the newest safety report.
+        detector: Evidence that its detection frames are read whole.
+        refused: Whether a setting says that the robot is ignored.
+        unlabelled: Whether boxes of its newest frame with boxes named no frame.
+        live_at: Last message of a live safety node for a robot that the fleet calls a
             recording (monotonic, s): from then on it counts as live.
-        refused_at: When a message that calls itself a replay was last refused, because
-            the robot is live (monotonic, s).
-        map_frame: Of a recording, the frame that its messages name.
-        sensed: The newest of each kind that has no member of its own.
-        doubts: What it says that contradicts itself or physics.
-        trusted_pose: The newest pose from before anything was contradicted.
-        present_boot: Which messages are proven to be of no earlier boot.
-        track: By which its motion is known.
+        refused_at: Last refusal of a message that calls itself a replay, since the
+            robot is live (monotonic, s).
+        map_frame: Map frame that the messages of a recording name.
+        sensed: Newest observation of each kind without an attribute of its own.
+        doubts: Contradictions of the robot with itself or physics.
+        trusted_pose: Newest pose from before the first open contradiction.
+        present_boot: The present boot, as far as echoes prove it.
+        track: Poses, twists and reports, and the motion that they show.
     """
 
     robot_id: str
@@ -157,9 +162,8 @@ class RobotState:
     navigation: Navigation | None = None
     navigation_received: Instant | None = None
     command_status: str | None = None
-    heard_at: float | None = None
-    heard_since: float = float("-inf")
-    heard_until: float = float("-inf")
+    contact_since: float = float("-inf")
+    contact_until: float = float("-inf")
     live_at: float | None = None
     refused_at: float | None = None
     map_frame: str | None = None
@@ -173,37 +177,37 @@ class RobotState:
         default_factory=lambda: defaultdict(StreamOrder)
     )
     _poses: deque[tuple[float, Pose2D]] = field(
-        default_factory=lambda: deque(maxlen=_HISTORY)
+        default_factory=lambda: deque(maxlen=_MOST_POSES)
     )
 
     def age_s(self, now: Instant) -> float | None:
-        """Age of the pose at most (s); None before the first, and while unknown."""
+        """Greatest age of the pose (s); None: no pose yet, or unknown."""
         return None if self.pose_at is None else max(0.0, now.mono - self.pose_at)
 
     def likely_pose_at(self) -> float | None:
-        """``pose_at``; where nobody knows it, when the pose came (monotonic, s)."""
+        """``pose_at``; while that is unknown, arrival of the pose (monotonic, s)."""
         if self.pose_at is None and self.odometry_received is not None:
             return self.odometry_received.mono
         return self.pose_at
 
     def possible_poses(self) -> tuple[Pose2D, ...]:
-        """Where it may be: where it says, and where it was before it was doubted."""
-        said = () if self.odometry is None else (self.odometry.pose,)
-        return said if self.trusted_pose is None else (*said, self.trusted_pose)
+        """Poses at which it may be: its own, and its last pose before a doubt."""
+        poses = () if self.odometry is None else (self.odometry.pose,)
+        return poses if self.trusted_pose is None else (*poses, self.trusted_pose)
 
     def link(self, now: Instant) -> Link:
         """LIVE, LATE or LOST by the age of the pose (docs/safety.md, "Age")."""
         age = self.age_s(now)
         if age is None:
             since = self.unproven_since
-            lost = since is not None and now.mono - since > LIMITS.late_s
-            return "LOST" if lost else "UNKNOWN"
+            is_lost = since is not None and now.mono - since > LIMITS.late_s
+            return "LOST" if is_lost else "UNKNOWN"
         if age <= LIMITS.live_s:
             return "LIVE"
         return "LATE" if age <= LIMITS.late_s else "LOST"
 
     def is_believed(self, now: Instant) -> bool:
-        """Whether its word counts against another's: LIVE, and nothing contradicted."""
+        """Whether it may count as evidence: LIVE, and nothing is contradicted."""
         return self.link(now) == "LIVE" and not self.doubts.is_open(now)
 
     @property
@@ -213,15 +217,15 @@ class RobotState:
 
     @property
     def is_replay(self) -> bool:
-        """Whether a recording plays this robot: by the fleet, while no live one sends.
+        """Whether it is a recording: by the fleet, until a live safety node speaks.
 
-        The name of its task does not count.
+        The name of its task does not count, since any robot may choose that.
         """
         return self.description.kind == "recording" and self.live_at is None
 
     @property
     def recording(self) -> str | None:
-        """The map frame of a recording: its own where it names none; None: live."""
+        """Map frame of a recording, by default its id; None: the robot is live."""
         return (self.map_frame or self.robot_id) if self.is_replay else None
 
     @property
@@ -230,7 +234,8 @@ class RobotState:
         return self.odometry is not None and not self.track.motion.moves
 
     def motion(self, now: Instant) -> Motion:
-        """Its motion in the last second before it was silent."""
+        """Motion in the last second before a silence."""
+        # After a silence nothing shows that the contradiction goes on.
         motion, received = self.track.motion, self.odometry_received
         if motion.contradiction is None or received is None:
             return motion
@@ -240,8 +245,8 @@ class RobotState:
     def pose_at_stamp(self, stamp_s: float | None) -> Pose2D | None:
         """The pose at a moment of the robot's own clock (s), interpolated.
 
-        Outside the short history the nearest end counts; without a stamp the newest,
-        and for one that is so old that it is of another clock.
+        Before the short history its first pose counts, after it the newest.  The newest
+        also counts without a stamp, and for a stamp so old that it is of another clock.
         """
         poses = self._poses
         if not poses:
@@ -255,18 +260,39 @@ class RobotState:
         (before, earlier), (after, later) = poses[index - 1], poses[index]
         return earlier.interpolate(later, (stamp_s - before) / (after - before))
 
-    def note_heard(self, moment: float) -> None:
-        """Note odometry or a report that was measured then (monotonic, s)."""
-        if moment - self.heard_until > LIMITS.silence_s:
-            self.heard_since = moment
-        self.heard_until = max(self.heard_until, moment)
+    def camera_now(self, now: Instant) -> Pose2D | None:
+        """Pose of its camera in ``map``; None: not reliable now."""
+        if self.odometry is None or self.detector.blind_by is not None:
+            return None
+        return self.camera_at(self.odometry.pose, now)
 
-    def heard_for_s(self, since: float) -> float:
-        """Time in which it was heard without a silence since a moment (s)."""
-        return self.heard_until - max(since, self.heard_since)
+    def camera_at(self, pose: Pose2D, now: Instant) -> Pose2D | None:
+        """Pose of its camera, if it is LIVE and its frames are fresh and read whole.
+
+        A robot that contradicts itself, however shortly, proves no place empty.
+        """
+        if self.detections_at is None or not self.is_believed(now):
+            return None
+        is_unread = self.detector.is_flawed(now, but="blind")
+        is_late = now.mono - self.detections_at > _FRAME_FRESH_S
+        if is_unread or is_late or self.detector.out_of_service is not None:
+            return None
+        return pose.compose(self.profile.camera)
+
+    def note_contact(self, moment: float) -> None:
+        """Note odometry or a report that was measured then (monotonic, s)."""
+        # After a silence the time to obey begins anew.
+        if moment - self.contact_until > LIMITS.silence_s:
+            self.contact_since = moment
+        # A late message must not shorten the series.
+        self.contact_until = max(self.contact_until, moment)
+
+    def contact_for_s(self, since: float) -> float:
+        """Time without a silence since a moment (s)."""
+        return self.contact_until - max(since, self.contact_since)
 
     def received_at(self, kind: type[Observation]) -> Instant | None:
-        """When the newest of a kind came in; None: never."""
+        """Time of the newest observation of a kind; None: there is none."""
         members = {
             Odometry: self.odometry_received,
             LaserScan: self.scan_received,
@@ -279,31 +305,35 @@ class RobotState:
 
     def judge(
         self, received: Received, origin: Origin, proven_at: float | None
-    ) -> OrderVerdict:
-        """Place a message in its stream's order.
+    ) -> Freshness:
+        """Freshness of a message in its stream.
 
-        A message of an earlier boot, which Orion kept or which its echo proves to be
-        one, must not make the present boot look old.  ``proven_at``: when the feedback
-        that it echoes was composed (monotonic, s); None where that proves nothing.
+        A message of an earlier boot must not make the present boot look old.  Orion may
+        have kept such a message, or its echo proves it to be one.
+
+        ``proven_at``: When the feedback that it echoes was composed (monotonic, s);
+        None: it proves nothing.
         """
-        order, is_earlier = self._orders[kind_of(received.observation)], received.asked
+        order = self._orders[kind_of(received.observation)]
+        is_earlier = received.is_query_answer
         if proven_at is not None:
             self.present_boot.meet(origin.boot, proven_at)
             is_earlier |= self.present_boot.is_past(origin.boot, proven_at)
-        if is_earlier and order.knows_better_than(origin):
+        if is_earlier and order.is_of_other_boot(origin):
             return "late"
         return order.judge(origin, received.at.mono, proven_at)
 
+    def order_of(self, kind: type[Observation]) -> StreamOrder:
+        """Order of its messages of a kind."""
+        return self._orders[kind]
+
     def is_newest(self, kind: type[Observation], origin: Origin) -> bool:
         """Whether nothing newer than this message is known."""
-        order = self._orders.get(kind)
-        return order is not None and (order.boot, order.seq) == (
-            origin.boot,
-            origin.seq,
-        )
+        order = self.order_of(kind)
+        return (order.boot, order.seq) == (origin.boot, origin.seq)
 
     def forget_poses(self) -> None:
-        """Drop every pose that was kept for ``pose_at_stamp``."""
+        """Drop all poses of ``pose_at_stamp``."""
         self._poses.clear()
 
     def remember_pose(self, moment: float, pose: Pose2D) -> None:
@@ -317,12 +347,11 @@ class RobotState:
 
 
 def learn_kind(robot: RobotState, received: Received, origin: Origin) -> None:
-    """Learn of a recording which frame it is in, and whether it is none at all.
+    """Learn the map frame of a recording, or that the robot is live after all.
 
-    Orion's answer may be of a time when the robot was live; a safety node that speaks
-    now is live unless it says that it plays a recording.
+    A safety node that speaks now is live, unless it says that it plays a recording.
     """
-    if robot.description.kind == "live" or received.asked:
+    if robot.description.kind == "live":
         return
     if origin.replay is not None:
         robot.map_frame = origin.replay
@@ -330,60 +359,74 @@ def learn_kind(robot: RobotState, received: Received, origin: Origin) -> None:
         robot.live_at = received.at.mono
 
 
-def apply_newest(robot: RobotState, received: Received, moment: float | None) -> None:
-    """Take the newest of its kind in; ``moment`` is when it was measured, or None."""
+def store(robot: RobotState, received: Received, moment: float | None) -> None:
+    """Store the newest observation of its kind.
+
+    ``moment``: Lower bound of its time of measurement (monotonic, s); None: unknown.
+    """
     observation, at = received.observation, received.at
-    if isinstance(observation, Odometry | SafetyReport) and not received.asked:
-        robot.note_heard(at.mono if moment is None else moment)
     match observation:
         case Odometry():
-            _drive(robot, observation, received, moment)
+            _store_odometry(robot, observation, received, moment)
         case LaserScan():
             robot.scan, robot.scan_received = observation, dated(at, moment)
             robot.scan_pose = robot.pose_at_stamp(observation.origin.own_s)
         case DetectionFrame():
-            _see(robot, observation, received, moment)
+            _store_frame(robot, observation, received, moment)
         case SafetyReport():
-            _hear(robot, observation, received, moment)
+            _store_report(robot, observation, received, moment)
         case Navigation():
             robot.navigation, robot.navigation_received = observation, at
         case CommandStatus():
             robot.command_status = observation.status
         case CommandAnswer() | GoalAnswer():
-            pass  # an event: the machine of its command takes it
+            pass  # An event, no state: the machine of its command takes it.
         case _:
             robot.sensed[type(observation)] = Sensed(observation, dated(at, moment))
 
 
-def _see(
+def note_motion(
+    robot: RobotState, observation: Observation, at: Instant, moment: float | None
+) -> None:
+    """Note contact with a robot, and its motion by the newest message."""
+    match observation:
+        case Odometry(pose=pose, twist=twist, origin=origin):
+            likely = at.mono if robot.pose_at is None else robot.pose_at
+            robot.track.note_odometry(pose, twist, likely, origin, at.mono)
+        case SafetyReport(linear=linear, angular=angular):
+            since = robot.safety_received or at
+            robot.track.note_report(linear, angular, since.mono)
+        case _:
+            return
+    robot.note_contact(at.mono if moment is None else moment)
+
+
+def _store_frame(
     robot: RobotState, frame: DetectionFrame, received: Received, moment: float | None
 ) -> None:
-    """Take the newest detection frame in."""
+    """Store the newest detection frame."""
     robot.detections_at = _not_before(
         robot.detections_at, robot.frame, frame.origin, moment
     )
     robot.frame, robot.frame_transport = frame, received.transport
     if frame.detections:
-        robot.unlabelled = any(one.frame_id is None for one in frame.detections)
+        robot.unlabelled = any(box.frame_id is None for box in frame.detections)
 
 
-def _hear(
+def _store_report(
     robot: RobotState, report: SafetyReport, received: Received, moment: float | None
 ) -> None:
-    """Take the newest safety report in."""
+    """Store the newest safety report."""
     known = robot.safety_received
     before = None if known is None else known.mono
     moment = _not_before(before, robot.safety, report.origin, moment)
     robot.safety, robot.safety_received = report, dated(received.at, moment)
-    if not received.asked:
-        likely = received.at.mono if moment is None else moment
-        robot.track.note_report(report.linear, report.angular, likely)
 
 
-def _drive(
+def _store_odometry(
     robot: RobotState, odometry: Odometry, received: Received, moment: float | None
 ) -> None:
-    """Take the newest odometry in."""
+    """Store the newest odometry."""
     at = received.at
     origin, pose, before = odometry.origin, odometry.pose, robot.odometry
     moment = _not_before(robot.pose_at, before, origin, moment)
@@ -392,23 +435,21 @@ def _drive(
     robot.estimated_since = _since(
         robot.estimated_since, at, holds=not origin.acknowledgements
     )
+    # During a contradiction the pose from before it stays trusted.
     if before is not None and not (robot.trusted_pose and robot.doubts.is_open(at)):
         robot.trusted_pose = before.pose
-    heard = robot.odometry_received
-    if heard is None or at.mono - heard.mono > LIMITS.silence_s:
+    previous = robot.odometry_received
+    if previous is None or at.mono - previous.mono > LIMITS.silence_s:
         robot.alive_since = at.mono
     robot.odometry, robot.odometry_received = odometry, at
     robot.odometry_transport = received.transport
     if before is not None and before.origin.boot != origin.boot:
-        robot.forget_poses()  # another boot counts its seconds anew
+        robot.forget_poses()  # Another boot counts its seconds anew.
     robot.remember_pose(at.wall if origin.own_s is None else origin.own_s, pose)
-    likely = at.mono if moment is None else moment
-    if not received.asked:
-        robot.track.note_odometry(pose, odometry.twist, likely, origin, at.mono)
 
 
 def _since(before: float | None, at: Instant, *, holds: bool) -> float | None:
-    """When something began that holds now (monotonic, s)."""
+    """Begin of something that holds now (monotonic, s); None: it does not hold."""
     if not holds:
         return None
     return at.mono if before is None else before
@@ -420,9 +461,10 @@ def _not_before(
     origin: Origin,
     moment: float | None,
 ) -> float | None:
-    """The moment of the newest message, which was measured after the one before it.
+    """Lower bound of the measurement time of the newest message (monotonic, s).
 
-    That holds within a boot, and where messages are counted.
+    Within a boot whose messages are counted it was measured after the one before it,
+    so the bound of that one, ``known``, holds as well.
     """
     if known is None or before is None:
         return moment
@@ -432,15 +474,16 @@ def _not_before(
 
 
 def dated(at: Instant, moment: float | None) -> Instant | None:
-    """A monotonic moment on both clocks."""
+    """A monotonic moment on both clocks; ``at`` is a moment on both."""
     return None if moment is None else at.later(moment - at.mono)
 
 
 SLOW_SHARE = 0.55
-"""Half speed, and what a drive and its odometry are off (of the greatest speed)."""
+"""Half speed and the error of drive and odometry, as a share of the greatest speed."""
 _LEAST_S, _BEYOND_BRAKING_S = 1.5, 0.5
+"""Least time to obey, and time beyond that of the braking (s)."""
 _FAST_FOR_S = 0.5
-"""A robot that is faster for less time has only been measured so."""
+"""Time of too high a speed that is no error of measurement (s)."""
 
 
 def slow_below(profile: RobotProfile) -> float:
@@ -450,6 +493,7 @@ def slow_below(profile: RobotProfile) -> float:
 
 def allowed_s(profile: RobotProfile) -> float:
     """Time that a robot may take to obey (s)."""
+    # Braking from the greatest speed to half of it, as weakly as margins assume.
     halves_s = (1.0 - HALF_SPEED) * profile.max_speed / profile.assumed_braking
     return max(_LEAST_S, halves_s + _BEYOND_BRAKING_S)
 
@@ -457,34 +501,37 @@ def allowed_s(profile: RobotProfile) -> float:
 class Obedience:
     """Obedience of robots to their limits, measured in their motion.
 
-    It is watched apart from decisions, since zones come and go while a robot that hears
-    nothing drives on, and whatever the robot reports.  A standing robot is obedient.
+    It does not depend on decisions: zones come and go while a robot without feedback
+    drives on.  Nor does it depend on the robot's report.  A standing robot is obedient.
 
-    Only time counts in which a robot was heard, by the moments of measurement
-    (monotonic, s): what comes late accuses nobody, and a silence begins it anew.
+    Only time with contact counts, by the times of measurement (monotonic, s).  So late
+    messages accuse nobody, and a silence begins the time anew.
     """
 
     def __init__(self) -> None:
-        self._told: dict[str, tuple[float, SpeedLimit]] = {}
+        self._limits: dict[str, tuple[float, SpeedLimit]] = {}
+        """Robot → begin of its half speed (monotonic, s), and the present limit."""
         self._fast_since: dict[str, float] = {}
 
     def published(self, limits: Mapping[str, SpeedLimit], now: Instant) -> None:
-        """Note the limits of a feedback that was sent to the fleet."""
+        """Note the limits in a feedback that was published."""
         for robot_id, limit in limits.items():
             if limit.speed_factor > HALF_SPEED:
-                self._told.pop(robot_id, None)
+                self._limits.pop(robot_id, None)
                 continue
-            since, _ = self._told.get(robot_id, (now.mono, limit))
-            self._told[robot_id] = since, limit
+            # The time to obey runs on while zones and reasons change.
+            since, _ = self._limits.get(robot_id, (now.mono, limit))
+            self._limits[robot_id] = since, limit
 
     def ignored(self, robot: RobotState, now: Instant) -> SpeedLimit | None:
-        """The limit that a robot does not keep to; None: it does, or nobody knows."""
+        """The limit that a robot disobeys; None: it obeys, or that is unknown."""
         robot_id = robot.robot_id
         if robot.motion(now).speed <= slow_below(robot.profile):
             self._fast_since.pop(robot_id, None)
             return None
-        fast_since = self._fast_since.setdefault(robot_id, robot.heard_until)
-        since, limit = self._told.get(robot_id, (now.mono, None))
-        is_late = robot.heard_for_s(since) > allowed_s(robot.profile)
-        is_fast = robot.heard_for_s(fast_since) >= _FAST_FOR_S
+        # By times of measurement: a late message accuses nobody.
+        fast_since = self._fast_since.setdefault(robot_id, robot.contact_until)
+        since, limit = self._limits.get(robot_id, (now.mono, None))
+        is_late = robot.contact_for_s(since) > allowed_s(robot.profile)
+        is_fast = robot.contact_for_s(fast_since) >= _FAST_FOR_S
         return limit if is_late and is_fast else None

@@ -1,9 +1,9 @@
-"""Situation of one robot: what it does, why, and what a person can do about it.
+"""Situation of one robot: its state, the cause, and the action open to a person.
 
-Every surface that says how a robot is (cards, map, fleet page, status line, REST) takes
-it from here, so that no two of them can differ (docs/dashboard.md, "Situation").  Of
-all that holds the first in ``ORDER`` is told; silence makes nothing better, and "clear"
-is what remains when nothing else holds.
+Cards, map, fleet page, status line and REST take the situation from here, so that no
+two of them can differ (docs/dashboard.md, "Situation").  Several situations may hold;
+the first in ``ORDER`` is shown.  Silence makes nothing better, and "clear" remains when
+nothing else holds.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -20,9 +20,8 @@ from iveg.domain.rule.clear import Reason as UnmetReason
 from iveg.domain.stop.commands import State
 
 Level = Literal["danger", "caution", "doubt", "locked", "working", "away"]
-"""Colour and shape, worst first: a P1; a robot near somebody, or on its way to a
-standstill; one of which iVeg does not know enough; one that may not move; one at work;
-one that never spoke."""
+"""Colour and shape, worst first: a P1; a robot near somebody or on its way to a
+standstill; in doubt; not free to move; at work; never received."""
 Kind = Literal[
     "disobeys",
     "lost_moving",
@@ -65,11 +64,11 @@ ORDER: Mapping[Kind, Level] = {
     "working": "working",
     "away": "away",
 }
-"""Order in which they are told, and how grave each is.
+"""Kinds in the order in which they are shown, and the level of each.
 
-The first that holds for a robot or the fleet is told, in the colour of the gravest that
-holds.  Line, cards, map and REST follow this table; ``iveg.models.docs``
-writes it for the page.
+The first that holds for a robot or the fleet is shown, in the colour of the gravest
+that holds.  Line, cards, map and REST follow this table; ``iveg.models.docs`` writes it
+for the page.
 """
 Action = Literal[
     "none",
@@ -90,13 +89,14 @@ Action = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Near:
-    """The person, robot or obstacle that a situation is about.
+    """Person, robot or obstacle that a situation is about.
 
     Attributes:
-        about: Its id, where it is known.
-        distance_m: To it (m); ``lane`` is where it is.
-        foretold_s: Until the robot reaches its zone (s); None: it is inside.
-        unseen_s: Since anybody saw it (s); of a robot of the fleet 0.
+        about: Its id, where known.
+        distance_m: Distance to it (m).
+        lane: Label of the aisle that it is in.
+        foretold_s: Time until the robot reaches its zone (s); None: it is inside.
+        unseen_s: Time since it was last seen (s); 0 for a robot of the fleet.
     """
 
     kind: str
@@ -109,18 +109,24 @@ class Near:
 
 @dataclass(frozen=True, slots=True)
 class RobotFacts:
-    """All that is known of one robot now.
+    """Facts about one robot from which its situation follows.
 
     Attributes:
-        age_s: Age of its pose (s); None while nobody knows.
-        report: Its newest, while that is fresh.
+        age_s: Age of its pose (s); None while unproven.
+        stands: Whether it is measured at rest.
+        report: Its newest report, while fresh.
+        limit: Its speed limit by the rule.
+        unmet: Conditions of "clear" that it does not meet.
+        doubts: Codes of its contradictions.
         alerts: Active alerts of it and of the fleet that are a situation, in order.
-        alert_about: The person or robot of the first of them.
-        near: Cause of the applied reason; ``told_near`` that of the speed limit.
-        out_of_service_by: The person who took its camera out of service.
-        stop: State of its STOP.
-        is_resuming: The order under way is a resume.
-        is_slow: Its measured speed is at most half of its greatest.
+        alert_about: Person or robot of the first of these alerts.
+        near: Cause of the reason that it reports.
+        limit_near: Cause of its speed limit.
+        stop: State of its STOP machine.
+        is_resuming: Whether the order under way is a resume.
+        out_of_service_by: Operator who took its camera out of service.
+        is_refused: Whether a setting excludes its messages.
+        is_slow: Whether its measured speed is at most half of its greatest.
     """
 
     robot_id: str
@@ -134,7 +140,7 @@ class RobotFacts:
     alerts: Sequence[Condition] = ()
     alert_about: Near | None = None
     near: Near | None = None
-    told_near: Near | None = None
+    limit_near: Near | None = None
     stop: State = "RUNNING"
     is_resuming: bool = False
     out_of_service_by: str | None = None
@@ -144,25 +150,25 @@ class RobotFacts:
 
     @property
     def applied(self) -> float:
-        """Speed factor that it reports to apply; 1.0 where it reports none."""
+        """Speed factor by its own report; 1.0 without a report."""
         if self.report is None:
             return FULL_SPEED
         return 0.0 if self.report.holds else self.report.speed_factor
 
     @property
     def is_silent(self) -> bool:
-        """Whether nothing is heard of it, now or ever."""
+        """Whether it is lost or was never received."""
         return self.link in ("LOST", "UNKNOWN")
 
     @property
     def is_held(self) -> bool:
-        """Whether it reports a hold, or waits for its resume."""
+        """Whether it reports a hold or waits for its resume."""
         report = self.report
         return report is not None and (bool(report.holds) or waits_for_resume(report))
 
     @property
     def factor(self) -> float | None:
-        """The strictest factor in force; None of a robot that never spoke."""
+        """Strictest speed factor in force; None for a robot that was never received."""
         if self.link == "UNKNOWN" and self.report is None:
             return None
         return min(self.applied, self.limit.speed_factor)
@@ -170,18 +176,19 @@ class RobotFacts:
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """One truth of one robot.
+    """One situation of one robot.
 
     Attributes:
         kind: Its place in ``ORDER``.
-        state: Names the sentence of what it does (``situation.is.{state}``).
-        cause: The reason that is applied: that of the robot's report, of the speed
-            limit, or what iVeg found itself.
-        why: Names the sentence of the cause (``situation.why.{why}``); None: the state
-            says it all.
-        about: The person, robot or hold that is the cause, where it is known.
-        factor: The strictest speed factor in force; None: unknown.
-        level: Level of the gravest that holds for the robot.
+        state: Key of the sentence for its state (``situation.is.{state}``).
+        cause: Reason in force: that of the robot's report, of the speed limit, or of
+            iVeg's own judgement.
+        why: Key of the sentence for the cause (``situation.why.{why}``); None: the
+            state says it all.
+        about: Id of the person, robot or hold that is the cause, where known.
+        action: Action that is open to a person.
+        factor: Strictest speed factor in force; None: unknown.
+        level: Gravest level that holds for the robot.
     """
 
     kind: Kind
@@ -200,27 +207,29 @@ HAZARDS: Mapping[str, Kind] = {
     "robot": "robot",
     "obstacle": "laser",
 }
-"""Reasons that are about somebody or something near, and their kinds."""
+"""Reasons with a person, robot or obstacle near by, and their kinds."""
 
 
 def waits_for_resume(report: SafetyReport) -> bool:
-    """Whether a robot that nothing holds stays where it is, and does not drive."""
+    """Whether a robot without a hold stands until somebody resumes it."""
     return report.reason == "hold" and report.speed_factor <= 0.0
 
 
 def limited(facts: RobotFacts) -> Iterator[Situation]:
-    """Slow: by its own report, or because iVeg tells it and it does not say so yet."""
+    """Slow, by its own report or by a stricter limit that it does not report yet."""
     report, limit, applied = facts.report, facts.limit, facts.applied
     if facts.is_held or facts.stop != "RUNNING":
         return
+    # A stricter limit counts before the report: the robot does not apply it yet.
     if limit.speed_factor < applied:
-        yield _slow("told", limit.speed_factor, limit.reason, facts.told_near, facts)
+        yield _slow("told", limit.speed_factor, limit.reason, facts.limit_near, facts)
     elif report is not None and applied < FULL_SPEED:
         yield _slow(_state(facts), applied, report.reason, facts.near, facts)
 
 
 def _state(facts: RobotFacts) -> str:
-    """State of a robot that says that it is slow; it may only be on its way to it."""
+    """State of a robot that reports a slow factor, by its measured motion."""
+    # "Half speed" is never said of a robot that is measured faster.
     if not facts.is_slow:
         return "told"
     if facts.applied <= 0.0:
@@ -235,58 +244,58 @@ def _slow(
     slow = Situation(kind, state, reason, slots={"factor": factor})
     if near is not None and near.kind in HAZARDS:
         return because_of(slow, near)
-    lacks = next((one for one in facts.unmet if one.limit_reason == reason), None)
-    if lacks is not None:
-        return _lacking(slow, lacks, facts.robot_id)
+    unmet = next((unmet for unmet in facts.unmet if unmet.limit_reason == reason), None)
+    if unmet is not None:
+        return _because_unmet(slow, unmet, facts.robot_id)
     action: Action = "check_network" if reason == "watchdog" else "none"
-    known = reason if reason in _PLAIN else "other"
-    return replace(slow, why=known, action=action)
+    return replace(slow, why=reason if reason in _PLAIN else "other", action=action)
 
 
 _PLAIN = ("person", "robot", "obstacle", "stale", "doubt", "watchdog", "unsupervised")
-"""Reasons that have a sentence without a distance."""
+"""Reasons with a sentence that names no distance."""
 
 
-_LACKS: Mapping[UnmetReason, tuple[Kind, Action]] = {
+_UNMET: Mapping[UnmetReason, tuple[Kind, Action]] = {
     "pose": ("unsure", "none"),
     "doubt": ("contradiction", "none"),
     "detector": ("blind", "check_camera"),
 }
 
 
-def _lacking(slow: Situation, lacks: ClearCondition, own_id: str) -> Situation:
-    """A robot that is slow because something is missing, its own or another's."""
-    own = "_own" if lacks.robot_id == own_id and lacks.reason != "pose" else ""
-    kind, action = _LACKS[lacks.reason]
+def _because_unmet(slow: Situation, unmet: ClearCondition, own_id: str) -> Situation:
+    """Slow situation with an unmet condition of "clear" as its cause."""
+    # A pose is always the robot's own, so its sentence has no second form.
+    own = "_own" if unmet.robot_id == own_id and unmet.reason != "pose" else ""
+    kind, action = _UNMET[unmet.reason]
     return replace(
         slow,
         kind=kind,
-        why=f"no_{lacks.reason}{own}",
-        about=lacks.robot_id,
+        why=f"no_{unmet.reason}{own}",
+        about=unmet.robot_id,
         action=action,
-        slots={**slow.slots, "about": lacks.robot_id},
+        slots={**slow.slots, "about": unmet.robot_id},
     )
 
 
 def because_of(situation: Situation, near: Near) -> Situation:
-    """A situation whose cause is somebody near."""
-    slots, why = dict(situation.slots), near.kind
+    """Situation with a person, robot or obstacle near by as its cause."""
+    slots, kind = dict(situation.slots), near.kind
     if near.distance_m is not None:
         slots["distance"] = round(near.distance_m, 1)
-        why = f"{near.kind}_at"
+        kind = f"{near.kind}_at"
         if near.foretold_s is not None:
             slots["seconds"] = round(near.foretold_s, 1)
-            why = f"{near.kind}_ahead"
+            kind = f"{near.kind}_ahead"
         elif near.kind == "person" and near.lane is not None:
             slots["lane"] = near.lane
-            why = "person_in"
+            kind = "person_in"
     if near.kind == "person" and near.unseen_s > LIMITS.seen_s:
-        # A distance to where somebody was is no distance to anybody.
+        # The distance to a place where somebody was is no distance to a person.
         slots["unseen"] = round(near.unseen_s)
-        why = "person_unseen" if near.lane is None else "person_was_in"
+        kind = "person_unseen" if near.lane is None else "person_was_in"
     if near.kind == "robot" and near.about is not None:
         slots["about"] = near.about
-    return replace(situation, why=why, cause=near.kind, about=near.about, slots=slots)
+    return replace(situation, why=kind, cause=near.kind, about=near.about, slots=slots)
 
 
 _STOPS: Mapping[State, tuple[Kind, str, Action]] = {
@@ -302,17 +311,17 @@ _STOPS: Mapping[State, tuple[Kind, str, Action]] = {
 }
 
 
-OF_STOPS = {state for _, state, _ in _STOPS.values()} | {"resuming"}
-"""States that follow an order of people: they have rules for silence of their own."""
+STOP_STATES = {state for _, state, _ in _STOPS.values()} | {"resuming"}
+"""States of STOP, release and resume, whose machine has its own rules for silence."""
 
 
 def stopping(facts: RobotFacts) -> Iterator[Situation]:
-    """Under an order of people."""
-    found = _STOPS.get(facts.stop)
+    """Under a STOP, release or resume of this iVeg."""
+    row = _STOPS.get(facts.stop)
     # A robot that moved while held is being stopped anew: its alert says both.
-    if found is None or "alert.stop_moved" in {one.key for one in facts.alerts}:
+    if row is None or "alert.stop_moved" in {alert.key for alert in facts.alerts}:
         return
-    kind, state, action = found
+    kind, state, action = row
     if facts.is_resuming and state == "releasing":
         state = "resuming"
     yield Situation(kind, state, "stop", action=action)
@@ -323,16 +332,16 @@ _UNLOCKED: Mapping[str, Action] = {
     "remote": "release",
     "auto": "none",
 }
-"""Action that lifts a hold; the one that takes most comes first."""
+"""Action that lifts a hold, by its ``ack``; the most laborious first."""
 
 
 def locked(facts: RobotFacts) -> Iterator[Situation]:
-    """Not free to move, by its own report; a STOP of ours says so itself."""
+    """Not free to move, by its own report; an open STOP has ``stopping`` instead."""
     report = facts.report
     if report is None or facts.stop not in ("RUNNING", "READY"):
         return
     if report.holds:
-        first = min(report.holds, key=lambda one: list(_UNLOCKED).index(one.ack))
+        first = min(report.holds, key=lambda hold: list(_UNLOCKED).index(hold.ack))
         action, source = _UNLOCKED[first.ack], f"held_{first.source}"
         yield Situation("locked", "held", "hold", source, first.id, action)
     elif waits_for_resume(report):
@@ -343,24 +352,27 @@ _KINDS, _LEVELS = list(ORDER), get_args(Level)
 
 
 def situation_of(facts: RobotFacts) -> Situation:
-    """The first of all that holds for a robot."""
-    found = _silent(facts) if facts.is_silent else _present(facts)
-    holding = [*_alerted(facts), *found]
-    first = min(holding, key=lambda one: _KINDS.index(one.kind))
-    level = min((ORDER[one.kind] for one in holding), key=_LEVELS.index)
-    if facts.link == "LATE" and first.state not in OF_STOPS:
+    """Situation of a robot: the first in ``ORDER`` of all that hold."""
+    others = _silent(facts) if facts.is_silent else _present(facts)
+    holding = [*_alerted(facts), *others]
+    first = min(holding, key=lambda situation: _KINDS.index(situation.kind))
+    # A mild kind may come first: its colour must not hide a graver situation.
+    level = min((ORDER[situation.kind] for situation in holding), key=_LEVELS.index)
+    if facts.link == "LATE" and first.state not in STOP_STATES:
         first, level = _late(first, level, facts)
     return replace(first, level=level, factor=facts.factor)
 
 
 def _present(facts: RobotFacts) -> Iterator[Situation]:
-    """All that holds for a robot that is heard; its work if nothing else does."""
+    """Situations of a robot that is received; the last is its work."""
     yield from locked(facts)
     yield from stopping(facts)
     yield from _doubted(facts)
     yield from limited(facts)
     yield from _blind(facts)
-    yield _at_work(facts)
+    # "Clear" is said of a robot that drives; a standing robot waits.
+    state = "waiting" if facts.stands else "clear"
+    yield Situation("working", "replay" if facts.is_replay else state, "clear")
 
 
 # --- alerts ---------------------------------------------------------------------------
@@ -380,27 +392,27 @@ ALERTED: Mapping[str, tuple[Kind, str, Action]] = {
 """Kind, state and action of each alert that is a situation, as in ``ORDER``."""
 
 
-def told_of(alerts: Iterable[Condition]) -> list[Condition]:
-    """The alerts that a situation names, the first in order first."""
+def situation_alerts(alerts: Iterable[Condition]) -> list[Condition]:
+    """Alerts that are a situation, in the order of ``ALERTED``."""
     order = list(ALERTED)
-    named = (one for one in alerts if one.key in ALERTED)
-    return sorted(named, key=lambda one: order.index(one.key))
+    named = (alert for alert in alerts if alert.key in ALERTED)
+    return sorted(named, key=lambda alert: order.index(alert.key))
 
 
 def _alerted(facts: RobotFacts) -> Iterator[Situation]:
     for alert in facts.alerts:
         kind, state, action = ALERTED[alert.key]
         if state == "lost_moving" and not facts.is_silent:
-            continue  # It is heard again; the alert clears with the next tick.
+            continue  # The robot is received again; the next tick clears the alert.
         slots = {name: alert.slots[name] for name in _SLOTS if name in alert.slots}
-        found = Situation(kind, state, "alarm", action=action, slots=slots)
+        alerted = Situation(kind, state, "alarm", action=action, slots=slots)
         if alert is facts.alerts[0] and facts.alert_about is not None:
-            found = because_of(found, facts.alert_about)
-        yield _aged(found, facts) if state == "lost_moving" else found
+            alerted = because_of(alerted, facts.alert_about)
+        yield _aged(alerted, facts) if state == "lost_moving" else alerted
 
 
 _SLOTS = ("boot", "by", "level")
-"""Slots of alerts that sentences of situations name."""
+"""Slots of alerts that sentences of situations use."""
 
 
 # --- silence --------------------------------------------------------------------------
@@ -412,13 +424,13 @@ def _silent(facts: RobotFacts) -> Iterator[Situation]:
     elif facts.age_s is None:
         yield Situation("lost", "age_unknown", "link", action="red_button")
     else:
-        # The network is well where a setting says that it is not heard.
+        # The silence of a refused robot comes from a setting, not from the network.
         action: Action = "none" if facts.is_refused else "red_button"
         yield _aged(Situation("lost", "lost", "link", action=action), facts)
 
 
 def _late(live: Situation, level: Level, facts: RobotFacts) -> tuple[Situation, Level]:
-    """A late robot: no better off than it was a moment ago."""
+    """Situation and level of a late robot, no better than before it was late."""
     if level == "danger":
         return live, level
     kind = min(live.kind, "unsure", key=_KINDS.index)
@@ -435,7 +447,7 @@ def _aged(situation: Situation, facts: RobotFacts) -> Situation:
 
 
 def _doubted(facts: RobotFacts) -> Iterator[Situation]:
-    """It contradicts itself, or nobody knows what it applies."""
+    """In contradiction with itself, or without a report of its speed factor."""
     if facts.doubts:
         slots: dict[str, Slot] = {"code": facts.doubts[0]}
         yield Situation(
@@ -445,33 +457,31 @@ def _doubted(facts: RobotFacts) -> Iterator[Situation]:
     report, owes_none = facts.report, facts.stop != "RUNNING" or facts.is_replay
     if owes_none or facts.applied < FULL_SPEED:
         return
-    # "Clear" needs the robot's own word.
+    # A robot is "clear" only by its own report; iVeg's limit alone proves nothing.
     if report is None or report.reason != "clear":
         yield Situation("unsure", "unreported", "link", action="check_robot")
 
 
 def _blind(facts: RobotFacts) -> Iterator[Situation]:
-    """Its camera is out of service or not being read: it warns nobody of people.
+    """Without a camera: out of service or not being read.
 
-    Somebody who is near it all the same is told with it.
+    The cause names a hazard near by: other robots or a laser may see it.
     """
-    by, own = facts.out_of_service_by, ClearCondition("detector", facts.robot_id)
+    operator, own = facts.out_of_service_by, ClearCondition("detector", facts.robot_id)
     if facts.is_held or facts.stop in ("STANDING", "READY"):
         return
-    if by is None and own not in facts.unmet:
+    if operator is None and own not in facts.unmet:
         return
-    why, slots = ("no_detector_own", {}) if by is None else ("camera_out", {"by": by})
-    blind = Situation(
-        "blind", "no_camera", "camera", why, None, "check_camera", None, slots
+    sentence, slots = (
+        ("no_detector_own", {})
+        if operator is None
+        else ("camera_out", {"by": operator})
     )
-    for near in (facts.near, facts.told_near):
+    blind = Situation(
+        "blind", "no_camera", "camera", sentence, None, "check_camera", None, slots
+    )
+    for near in (facts.near, facts.limit_near):
         if near is not None and near.kind in HAZARDS:
             blind = because_of(blind, near)
             break
     yield blind
-
-
-def _at_work(facts: RobotFacts) -> Situation:
-    """Nothing else holds: "clear" is earned by a way that is driven, not by waiting."""
-    state = "waiting" if facts.stands else "clear"
-    return Situation("working", "replay" if facts.is_replay else state, "clear")

@@ -16,24 +16,25 @@ def format_stamp(wall: float) -> str:
 
 @lru_cache(maxsize=4096)
 def _second(wall: int) -> str:
-    """Without its end, which alone differs among stamps of a second.
+    """Text of a whole second, without its end.
 
-    Kept are the seconds of all people and alerts that are shown again and again.
+    The cache has the seconds of all people and alerts, which are drawn many times.
     """
     return datetime.fromtimestamp(wall, UTC).isoformat().removesuffix("+00:00")
 
 
 def parse_stamp(text: str) -> float | None:
-    """Unix seconds of an ISO-8601 text; None where it is none."""
+    """Unix seconds of an ISO-8601 text; None: it is no such text."""
     try:
         moment = datetime.fromisoformat(text)
     except ValueError:
         return None
     if moment.tzinfo is None:
+        # The contract writes UTC, so a stamp without a zone is UTC.
         moment = moment.replace(tzinfo=UTC)
     return moment.timestamp()
 
 
 def wall_of(at: Instant | None) -> float | None:
-    """Wall-clock time of an instant (Unix s); None of None."""
+    """Wall-clock time of an instant (Unix s); None for None."""
     return None if at is None else at.wall

@@ -1,7 +1,6 @@
 """Order of the messages of one robot (docs/interfaces/mqtt.md).
 
-The newest wins: no message waits for a late one, and no stamp ever decides which is
-newer.
+The newest message wins: no message waits for a late one, and no stamp decides.
 """
 
 from collections import deque
@@ -11,14 +10,18 @@ from typing import Literal
 
 from iveg.domain.observations import Origin
 
-OrderVerdict = Literal["new", "late", "duplicate", "refused"]
-"""``refused``: it calls itself a replay, and its robot is live."""
+Freshness = Literal["new", "late", "duplicate", "refused", "stored"]
+"""Place of a message in its stream.
+
+``refused``: a replay of a robot that is live.  ``stored``: Orion's answer to a query
+that is newer than all that is known: it is shown, but is no news and proves nothing.
+"""
 
 _REMEMBERED_SEQS = 512
-"""Copies of the last ten seconds and more, at 30 Hz, are known for copies."""
+"""Counts in which a copy is recognised: more than ten seconds of them at 30 Hz."""
 _REMEMBERED_BOOTS = 16
 ALONE_S = 1.0
-"""An old boot that alone speaks for so long is the present one again."""
+"""Time after which an old boot that speaks alone is the present one again (s)."""
 _ROUNDING_S = 1e-6
 
 
@@ -26,29 +29,32 @@ _ROUNDING_S = 1e-6
 class PresentBoot:
     """The present boot of a robot, by the feedback that its messages echo.
 
-    A boot has heard no feedback from before its start.  So a message that echoes older
-    feedback than the first that a later boot echoed is of an earlier boot.
+    A boot has received no feedback from before its start.  So a message is of an
+    earlier boot if it echoes older feedback than the first that a later boot echoed.
+
+    Attributes:
+        _since: Composition of the first feedback that it echoed (monotonic, s).
     """
 
     _boot: str | None = None
     _since: float = -inf
-    """The first feedback that it echoed was composed then (monotonic, s)."""
-    _met: deque[str | None] = field(
+    _known_boots: deque[str | None] = field(
         default_factory=lambda: deque(maxlen=_REMEMBERED_BOOTS)
     )
 
     def meet(self, boot: str | None, proven_at: float) -> None:
-        """Note that this boot has heard feedback that was composed then."""
-        if boot in self._met:
+        """Note that a boot echoes feedback that was composed at ``proven_at``."""
+        # Only its first echo bounds its start.
+        if boot in self._known_boots:
             return
-        self._met.append(boot)
+        self._known_boots.append(boot)
         if proven_at > self._since:
             self._boot, self._since = boot, proven_at
 
     def is_past(self, boot: str | None, proven_at: float | None) -> bool:
-        """Whether a message is of an earlier boot; unproven, of any but the present."""
+        """Whether a message is of an earlier boot; unproven: of any other boot."""
         if proven_at is None:
-            return bool(self._met) and boot != self._boot
+            return bool(self._known_boots) and boot != self._boot
         return proven_at < self._since - _ROUNDING_S
 
 
@@ -57,46 +63,59 @@ class StreamOrder:
     """The position of one stream (robot and kind).
 
     A straggler of an unknown boot looks like a new start, and would make the present
-    boot an old one for ever.  So an old boot that goes on counting for a second, with
-    no message of the present one in between, becomes the present one again; and at once
-    when it has heard feedback from after the straggler, which itself proves nothing.
+    boot an old one for ever.  So an old boot becomes the present one again if it counts
+    on for a second without a message of the present boot in between, or at once if it
+    echoes feedback from after a straggler without a proof.
+
+    Attributes:
+        boot: Present boot; ``seq``: its newest count.
+        _began: Arrival of the boot's first message (monotonic, s).
+        _is_proven: Whether a message of this boot has echoed our feedback.
+        _old_boots: Old boot → its newest count.
+        _returning: The old boot that speaks alone, and since when (monotonic, s).
+        _recent: Last counts as they arrived: FIWARE nearly always brings copies.
     """
 
     boot: str | None = None
     seq: int = -1
     _began: float = inf
-    """Arrival of the boot's first message (monotonic, s)."""
     _is_proven: bool = False
-    _old: dict[str, int] = field(default_factory=dict)
+    _old_boots: dict[str, int] = field(default_factory=dict)
     _returning: tuple[str, float] | None = None
-    """The old boot that speaks alone, and since when (monotonic, s)."""
-    _known: dict[int, None] = field(default_factory=dict)
-    """The last counts in the order of arrival: FIWARE brings copies nearly always."""
+    _recent: dict[int, None] = field(default_factory=dict)
 
-    def knows_better_than(self, origin: Origin) -> bool:
-        """Whether a record is of an earlier boot and must not be judged."""
+    def is_of_other_boot(self, origin: Origin) -> bool:
+        """Whether a message is of another boot than the present one of this stream."""
         return self.boot is not None and origin.boot != self.boot
 
+    def knows(self, boot: object, seq: object) -> bool:
+        """Whether a message of the present boot was judged before."""
+        return type(seq) is int and boot == self.boot and seq in self._recent
+
     def judge(
-        self, origin: Origin, arrived: float = 0.0, proven_at: float | None = None
-    ) -> OrderVerdict:
+        self, origin: Origin, arrived: float, proven_at: float | None = None
+    ) -> Freshness:
         """Judge whether a message is newer than all before, and remember it.
 
-        A message without identity is new by arrival.  It ``arrived`` then, and the
-        feedback that it echoes was composed at ``proven_at`` (monotonic, s); None where
-        that proves nothing.
+        Args:
+            origin: Boot and count of the message; without both it is new by arrival.
+            arrived: Time of arrival (monotonic, s).
+            proven_at: When the feedback that it echoes was composed (monotonic, s);
+                None: it proves nothing.
         """
         boot, seq = origin.boot, origin.seq
         if boot is None or seq is None:
             return "new"
         if boot != self.boot:
-            if boot in self._old and not self._returns(origin, arrived, proven_at):
+            if boot in self._old_boots and not self._returns(
+                origin, arrived, proven_at
+            ):
                 return "late"
             self._begin(boot, seq, arrived, is_proven=proven_at is not None)
             return "new"
         self._returning = None
         self._is_proven |= proven_at is not None
-        if seq in self._known:
+        if seq in self._recent:
             return "duplicate"
         self._remember(seq)
         if seq <= self.seq:
@@ -105,11 +124,12 @@ class StreamOrder:
         return "new"
 
     def _returns(self, origin: Origin, arrived: float, proven_at: float | None) -> bool:
-        """Whether an old boot lives: it echoes that, or goes on counting alone."""
+        """Whether an old boot is alive: its echo proves it, or it counts on alone."""
         boot, seq = origin.boot or "", origin.seq or 0
-        if seq <= self._old[boot]:
+        if seq <= self._old_boots[boot]:
             return False
-        self._old[boot] = seq
+        self._old_boots[boot] = seq
+        # It received feedback after the straggler came, so it outlived that message.
         if proven_at is not None and proven_at > self._began and not self._is_proven:
             return True
         if self._returning is None or self._returning[0] != boot:
@@ -117,17 +137,18 @@ class StreamOrder:
         return arrived - self._returning[1] >= ALONE_S
 
     def _begin(self, boot: str, seq: int, arrived: float, *, is_proven: bool) -> None:
-        self._old.pop(boot, None)
+        self._old_boots.pop(boot, None)
         if self.boot is not None:
-            self._old[self.boot] = self.seq
-        while len(self._old) > _REMEMBERED_BOOTS:
-            del self._old[next(iter(self._old))]
+            self._old_boots[self.boot] = self.seq
+        # Bounded, since any client of the broker can name new boots.
+        while len(self._old_boots) > _REMEMBERED_BOOTS:
+            del self._old_boots[next(iter(self._old_boots))]
         self.boot, self.seq, self._returning = boot, seq, None
         self._began, self._is_proven = arrived, is_proven
-        self._known.clear()
+        self._recent.clear()
         self._remember(seq)
 
     def _remember(self, seq: int) -> None:
-        self._known[seq] = None
-        if len(self._known) > _REMEMBERED_SEQS:
-            del self._known[next(iter(self._known))]
+        self._recent[seq] = None
+        if len(self._recent) > _REMEMBERED_SEQS:
+            del self._recent[next(iter(self._recent))]

@@ -1,4 +1,4 @@
-"""Types of the members of messages: how each is read, bounded and written.
+"""Types of the members of messages, with their bounds and digits.
 
 A message is a dataclass of these types, so it is declared once.  ``iveg.ngsi.codec``
 reads and writes it by that declaration.  Nothing is coerced; NaN is no number.
@@ -31,18 +31,19 @@ FORBIDDEN = frozenset("<>\"'=;()")
 def clean_text(text: str) -> str:
     """Text that is safe to keep and show: NFC, no control or format marks, short."""
     if text.isascii() and text.isprintable():
-        # Nearly all is plain, and plain text needs no look at each character.
+        # Fast path: nearly all text is plain, and the loop below is slow.
         return text[:MAX_TEXT]
-    kept = "".join(
-        c
-        for c in unicodedata.normalize("NFC", text[: 4 * MAX_TEXT])
-        if unicodedata.category(c)[0] != "C"
+    legible_text = "".join(
+        character
+        # Four times: a normalised character may be made of several.
+        for character in unicodedata.normalize("NFC", text[: 4 * MAX_TEXT])
+        if unicodedata.category(character)[0] != "C"
     )
-    return kept[:MAX_TEXT]
+    return legible_text[:MAX_TEXT]
 
 
 def legible(text: str) -> str:
-    """Text without characters that are unseen or turn others round (Cc, Cf, Cs …).
+    """Text without invisible and direction-changing characters (Cc, Cf, Cs …).
 
     Line ends stay.
     """
@@ -73,7 +74,7 @@ MAX_PATH = 1024
 
 
 def digits(count: int) -> PlainSerializer:
-    """So many digits are written after the point."""
+    """Serialiser that writes so many digits after the point."""
 
     def rounded(value: float) -> float:
         return round(value, count)
@@ -81,8 +82,8 @@ def digits(count: int) -> PlainSerializer:
     return PlainSerializer(rounded, return_type=float)
 
 
-def one_of(*words: str) -> AfterValidator:
-    """Only these texts are read."""
+def known_text(*words: str) -> AfterValidator:
+    """Validator that accepts these texts only."""
 
     def known(text: str) -> str:
         if text not in words:
@@ -93,7 +94,7 @@ def one_of(*words: str) -> AfterValidator:
 
 
 def place(axes: str, count: int = 4) -> tuple[BeforeValidator, PlainSerializer]:
-    """A tuple of numbers is an object on the wire: ``{"x": …, "y": …}``; z may lack."""
+    """Tuple of numbers that is ``{"x": …, "y": …}`` on the wire; z may be missing."""
 
     def read(value: object) -> object:
         if not isinstance(value, dict):
@@ -101,7 +102,10 @@ def place(axes: str, count: int = 4) -> tuple[BeforeValidator, PlainSerializer]:
         return tuple({"z": 0.0, **value}.get(axis) for axis in axes)
 
     def write(numbers: tuple[float, ...]) -> dict[str, float]:
-        return {a: round(n, count) for a, n in zip(axes, numbers, strict=True)}
+        return {
+            axis: round(number, count)
+            for axis, number in zip(axes, numbers, strict=True)
+        }
 
     return BeforeValidator(read), PlainSerializer(write)
 
@@ -120,9 +124,9 @@ Share = Annotated[float, Strict(), Field(ge=0, le=1), digits(4)]
 Metres = Annotated[float, Strict(), Field(ge=-1e6, le=1e6), digits(4)]
 Radians = Annotated[float, Strict(), Field(ge=-1e4, le=1e4)]
 Speed = Annotated[float, Strict(), Field(ge=-100, le=100), digits(4)]
-"""Beyond any machine; a speed that a robot of its profile cannot have is doubt."""
+"""Speed within the bounds of any machine; the profile of a robot bounds it further."""
 Seconds = Annotated[float, Strict(), Field(ge=0, le=1e9), digits(4)]
-"""Up to thirty years."""
+"""Duration of at most thirty years (s)."""
 LidarPoints = Annotated[
     list[Annotated[float, Strict(), Field(ge=0, le=MAX_RANGE_M)] | None],
     Field(max_length=MAX_BEAMS),
@@ -130,15 +134,15 @@ LidarPoints = Annotated[
 MaxRange = Annotated[float, Strict(), Field(gt=0, le=1e4)]
 
 IN_MESSAGE: Final = "in the message"
-"""Marks a part whose members stand on the wire among those of its message."""
+"""Mark of a part whose members are members of its message on the wire."""
 OR_NONE: Final = WrapValidator(_none_if_unreadable)
-"""A member that cannot be read is unknown, and never costs the rest of its message."""
+"""An unreadable member is None: it never costs the rest of its message."""
 IF_ANY: Final = Field(exclude_if=not_)
 """A member that is false or empty is not written."""
 
 
 class Wire(BaseModel):
-    """Base of models of what comes over the wire and is no message of a robot."""
+    """Base of models of other input than messages of robots."""
 
     model_config = ConfigDict(
         strict=True, extra="ignore", allow_inf_nan=False, frozen=True

@@ -1,13 +1,12 @@
-"""The laser as a second witness: obstacles near a robot that nobody has explained.
+"""Laser tracks of a robot: obstacles near it that nothing explains.
 
 A camera sees less than half of the people beside a robot; its laser sees most of the
-others.  Of a scan those returns count that are within two metres of the robot's outline
-and that neither the plan of the greenhouse nor somebody who is known explains.
-Together they must be of a person's size, or have moved, and last for 0.2 s.  Where no
-plan draws what stands there only the robot's own path counts, or every row would slow
-it.
+others.  Returns count within two metres of the robot's outline, if neither the plan of
+the greenhouse nor a known peer explains them.  Together they must have a person's size,
+or have moved, and last for 0.2 s.  Without a drawn plan only the robot's own path
+counts, or every row would slow it.
 
-A witness only adds: it lifts no limit, and finds no spot empty.
+Laser tracks only add: they lift no limit, and prove no place empty.
 """
 
 import math
@@ -24,27 +23,33 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import LaserScan
 
 LASTS_S = 0.2
-"""Anything shorter is noise, or an insect."""
+"""Least duration of an obstacle; anything shorter is noise, or an insect (s)."""
 _Place = tuple[float, float]
 _LARGEST_M = 1.0
-"""Two people side by side; what is larger is counted once it moves."""
+"""Size of two people side by side; a larger obstacle counts once it moves (m)."""
 _MOVED_M = 0.4
+"""Way from which a larger obstacle counts (m)."""
 _WALKED_M, _WALKED_S, _PASSED_M = 0.5, 0.5, 0.3
-"""Least way, time, and way as seen from the robot, of somebody who walks: more than of
-what it tows, or of the part of a wall that it sees as it passes."""
+"""Least way in ``map`` (m), time (s), and way in ``base_link`` (m) of a walking person.
+
+A towed load stays in ``base_link``; a wall that the robot passes stays in ``map``.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
-    """Something of a person's size near a robot that nobody explained.
+    """Something near a robot that nothing explains.
 
     Attributes:
-        place: Its middle in ``map`` (m); ``first`` where it was when it was seen first.
-        beside: The same in the robot's ``base_link`` (m); ``first_beside`` likewise.
-        size_m: From its first return to its last.
-        gap_m: From the robot's outline to its nearest return.
-        since: When it was seen first; ``at`` newest (monotonic, s).
-        walked: Whether it moved like somebody who walks.
+        place: Its middle in ``map`` (m).
+        first: Its middle in the first scan that shows it (m).
+        beside: Its middle in the robot's ``base_link`` (m).
+        first_beside: Its middle in that scan, in ``base_link`` (m).
+        size_m: Diagonal of the box about its returns (m).
+        gap_m: Distance from the robot's outline to its nearest return (m).
+        since: Time of its first scan (monotonic, s).
+        at: Time of its newest scan (monotonic, s).
+        walked: Whether it has moved like a walking person.
     """
 
     place: _Place
@@ -57,21 +62,21 @@ class Obstacle:
     at: float
     walked: bool = False
 
-    def seen_again(self, found: "Obstacle") -> "Obstacle":
-        """The obstacle with what a later scan found of it."""
-        seen = replace(
-            found, first=self.first, first_beside=self.first_beside, since=self.since
+    def seen_again(self, newest: "Obstacle") -> "Obstacle":
+        """The obstacle after a later scan, which shows it as ``newest``."""
+        track = replace(
+            newest, first=self.first, first_beside=self.first_beside, since=self.since
         )
-        return replace(seen, walked=self.walked or seen.walks)
+        return replace(track, walked=self.walked or track.walks)
 
     @property
     def way_m(self) -> float:
-        """Distance from where it was seen first (m)."""
+        """Distance from its first place (m)."""
         return math.dist(self.place, self.first)
 
     @property
     def walks(self) -> bool:
-        """Whether it went like somebody who walks."""
+        """Whether it moves like a walking person."""
         return (
             self.size_m <= _LARGEST_M
             and self.at - self.since >= _WALKED_S - 1e-6
@@ -81,40 +86,43 @@ class Obstacle:
 
     @property
     def fits(self) -> bool:
-        """Whether it is or moves like somebody."""
+        """Whether it has a person's size, or has moved."""
         return self.size_m <= _LARGEST_M or self.way_m > _MOVED_M
 
     @property
     def counts(self) -> bool:
-        """Whether it is there for long enough, too."""
+        """Whether it fits, and has lasted for long enough."""
         return self.fits and self.at - self.since >= LASTS_S - 1e-6
 
 
 _Floats = NDArray[np.float64]
 GONE_S = 0.5
-"""Without a return for so long it is gone."""
+"""Time without a return after which an obstacle is gone (s)."""
 PLAN_M = 0.4
-"""The plan is off by 0.2 m, or plants lean out so far; a pose is off by the rest."""
+"""Error of the plan or overhang of plants, 0.2 m, and error of the pose (m)."""
 _TURN_S = 0.05
-"""A scan and the pose that it is placed by are so far apart."""
+"""Time between a scan and the pose that places it (s)."""
 _PEER_M = 1.0
-"""About the ``base_link`` of a peer that drives, who slows everybody near it anyway:
-half of its body, and how far it went since it told."""
+"""Radius about a driving peer: half its body, and its way since its pose (m).
+
+It may be generous, since a driving peer slows everybody near it anyway.
+"""
 _BESIDE_PEER_M = 0.3
-"""About the body of one that stands: errors of both poses."""
+"""Margin about the body of a standing peer: errors of both poses (m)."""
 _APART_M = 0.3
-"""Returns of one body are not farther apart."""
+"""Greatest distance between neighbouring returns of one body (m)."""
 _LEAST_RETURNS = 2
 _BESIDE_M = 0.2
-"""Margin beside the robot's own path, where there is no plan."""
-_TURN_OF_ONE_S = 0.1
+"""Margin beside the robot's own path, where there is no plan (m)."""
+_REPORTED_FOR_S = 0.1
+"""Time for which each of several walking people is reported in turn (s)."""
 _EVERY_S = 0.09
-"""Ten sweeps a second are enough, and leave the robot's processor alone."""
+"""Least time between scans: ten a second are enough, and spare the processor (s)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """Outlines of the greenhouse and its rows, posts and obstacles, in ``map`` (m).
+    """Plan of the greenhouse: walls, rows, posts and obstacles, in ``map`` (m).
 
     Attributes:
         bounds: The outer wall.
@@ -127,11 +135,11 @@ class Plan:
     posts: _Floats
 
     @classmethod
-    def of(cls, greenhouse: Greenhouse) -> "Plan":
+    def from_greenhouse(cls, greenhouse: Greenhouse) -> "Plan":
         """The plan of a greenhouse."""
-        areas = (*greenhouse.rows, *(one.area for one in greenhouse.obstacles))
-        sides = [(one.xmin, one.ymin, one.xmax, one.ymax) for one in areas]
-        posts = [(one.x, one.y, one.radius) for one in greenhouse.posts]
+        areas = (*greenhouse.rows, *(crate.area for crate in greenhouse.obstacles))
+        sides = [(area.xmin, area.ymin, area.xmax, area.ymax) for area in areas]
+        posts = [(post.x, post.y, post.radius) for post in greenhouse.posts]
         return cls(
             greenhouse.bounds,
             np.array(sides, np.float64).reshape(-1, 4),
@@ -144,11 +152,12 @@ class Plan:
         return len(self.rectangles) + len(self.posts) > 0
 
     def distance_to(self, x: _Floats, y: _Floats) -> _Floats:
-        """Distances of points, shape (n,), from the nearest thing drawn (m)."""
+        """Distances of points, shape (n,), from the nearest part of the plan (m)."""
         area = self.bounds
         inside = np.minimum.reduce(
             (x - area.xmin, area.xmax - x, y - area.ymin, area.ymax - y)
         )
+        # Outside the wall the plan explains everything: distance 0.
         nearest: _Floats = np.maximum(inside, 0.0)
         if len(self.rectangles):
             nearest = np.minimum(nearest, _from_areas(self.rectangles, x, y).min(0))
@@ -175,22 +184,22 @@ def _from_posts(posts: _Floats, x: _Floats, y: _Floats) -> _Floats:
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """A robot seen from above, centred on ``base_link``: length and width (m)."""
+    """Outline of a robot from above, centred on ``base_link``: length, width (m)."""
 
     length: float = CAUTIOUS.length
     width: float = CAUTIOUS.width
 
     def gap_to(self, x: _Floats, y: _Floats) -> _Floats:
-        """Distances of points in ``base_link``, shape (n,), from it (m)."""
-        ahead = np.maximum(np.abs(x) - self.length / 2, 0.0)
+        """Distances of points in ``base_link``, shape (n,), from the outline (m)."""
+        along = np.maximum(np.abs(x) - self.length / 2, 0.0)
         aside = np.maximum(np.abs(y) - self.width / 2, 0.0)
-        gap: _Floats = np.hypot(ahead, aside)
-        return gap
+        distance: _Floats = np.hypot(along, aside)
+        return distance
 
 
 @dataclass(frozen=True, slots=True)
 class KnownPeer:
-    """A peer where it told that it is, in ``map``; its body is taken for the same."""
+    """A peer at its own pose in ``map``; its body counts as large as the robot's."""
 
     pose: Pose2D
     stands: bool
@@ -200,8 +209,8 @@ class Witness:
     """Laser tracks of the obstacles beside one robot.
 
     Args:
-        outline: The robot's body.
-        plan: None: nobody drew the place.
+        outline: Outline of the robot.
+        plan: Plan of the greenhouse; None: there is none.
     """
 
     def __init__(self, outline: Outline, plan: Plan | None) -> None:
@@ -218,29 +227,42 @@ class Witness:
         known: Iterable[KnownPeer],
         now: float,
     ) -> None:
-        """Take a scan, made at ``pose`` in ``map`` (monotonic, s)."""
+        """Take a scan.
+
+        Args:
+            scan: The scan.
+            pose: The robot's pose in ``map`` at that time.
+            twist: The robot's twist.
+            known: Peers, whose returns are explained.
+            now: This moment (monotonic, s).
+        """
         if now - self._looked_at < _EVERY_S:
             return
         self._looked_at = now
         bodies = _bodies(self._unexplained(scan, pose, twist, known))
         if self._plan is None or not self._plan.is_drawn:
-            bodies = [one for one in bodies if self._is_ahead(one, pose, twist)]
-        earlier = [one for one in self._known if now - one.at <= GONE_S]
-        found = [self._measured(body, pose, now) for body in bodies]
-        seen = [self._joined(one, earlier) for one in found]
-        self._known = (*seen, *earlier)
+            bodies = [body for body in bodies if self._is_ahead(body, pose, twist)]
+        earlier = [track for track in self._known if now - track.at <= GONE_S]
+        newest = [
+            self._joined(self._measured(body, pose, now), earlier) for body in bodies
+        ]
+        # ``_joined`` took out all that go on; the others may come back.
+        self._known = (*newest, *earlier)
 
     def present(self, now: float) -> list[Obstacle]:
-        """Obstacles that count and were there within the last half second."""
-        return [one for one in self._known if one.counts and now - one.at <= GONE_S]
+        """Obstacles that count and were seen within the last half second."""
+        return [
+            track for track in self._known if track.counts and now - track.at <= GONE_S
+        ]
 
     def obstacle(self, now: float) -> Obstacle | None:
-        """Those who walk, in turn, so that nobody is left out; else the nearest."""
+        """Each walking obstacle in turn; if nothing walks, the nearest obstacle."""
         present = self.present(now)
-        walking = [one for one in present if one.walked]
+        walking = [track for track in present if track.walked]
         if walking:
-            return walking[int(now / _TURN_OF_ONE_S) % len(walking)]
-        return min(present, key=lambda one: one.gap_m, default=None)
+            # In turn, since a report has room for one, and iVeg needs all of them.
+            return walking[int(now / _REPORTED_FOR_S) % len(walking)]
+        return min(present, key=lambda track: track.gap_m, default=None)
 
     def _unexplained(
         self,
@@ -249,65 +271,69 @@ class Witness:
         twist: Twist2D,
         known: Iterable[KnownPeer],
     ) -> _Floats:
-        """Returns near the robot that nothing explains; shape (n, 2), in ``map``."""
+        """Returns near the robot without explanation; shape (n, 2), in ``map``."""
         x, y = scan.points(Pose2D(0.0, 0.0, 0.0)).astype(np.float64).T
-        gap = self._outline.gap_to(x, y)
-        near = (gap > 0.0) & (gap <= LIMITS.zone_default_m)
+        distance = self._outline.gap_to(x, y)
+        # Distance 0: a return inside the outline is of the robot itself.
+        near = (distance > 0.0) & (distance <= LIMITS.zone_default_m)
         away = np.hypot(x, y)[near]
         x, y = pose.transform(x[near], y[near])
-        left = np.ones(x.shape, np.bool_)
+        is_obstacle = np.ones(x.shape, np.bool_)
         if self._plan is not None:
+            # While the robot turns, far returns are placed worse than near ones.
             blurred = PLAN_M + abs(twist.angular_z) * _TURN_S * away
-            left = self._plan.distance_to(x, y) > blurred
-        for one in known:
-            ahead, aside = one.pose.inverse(x, y)
-            if one.stands:
-                left &= self._outline.gap_to(ahead, aside) > _BESIDE_PEER_M
+            is_obstacle = self._plan.distance_to(x, y) > blurred
+        for peer in known:
+            along, aside = peer.pose.inverse(x, y)
+            if peer.stands:
+                is_obstacle &= self._outline.gap_to(along, aside) > _BESIDE_PEER_M
             else:
-                left &= np.hypot(ahead, aside) > _PEER_M
-        return np.column_stack((x[left], y[left]))
+                is_obstacle &= np.hypot(along, aside) > _PEER_M
+        return np.column_stack((x[is_obstacle], y[is_obstacle]))
 
     def _is_ahead(self, body: _Floats, pose: Pose2D, twist: Twist2D) -> bool:
         """Whether a part of a body lies where the robot is driving."""
         x, y = pose.inverse(*body.T)
-        ahead = (x > 0.0) == (twist.linear_x >= 0.0)
-        return bool(np.any(ahead & (np.abs(y) <= self._outline.width / 2 + _BESIDE_M)))
+        in_front = (x > 0.0) == (twist.linear_x >= 0.0)
+        return bool(
+            np.any(in_front & (np.abs(y) <= self._outline.width / 2 + _BESIDE_M))
+        )
 
-    def _joined(self, found: Obstacle, earlier: list[Obstacle]) -> Obstacle:
-        """The nearest earlier obstacle that it may be, seen again; else it is new.
+    def _joined(self, newest: Obstacle, earlier: list[Obstacle]) -> Obstacle:
+        """The nearest earlier obstacle that it may continue, else itself.
 
-        That one is taken out of ``earlier``.
+        The earlier obstacle is removed from ``earlier``.
         """
 
-        def away(one: Obstacle) -> float:
-            return math.dist(one.place, found.place)
+        def away(track: Obstacle) -> float:
+            return math.dist(track.place, newest.place)
 
         near = min(earlier, key=away, default=None)
         if near is None:
-            return found
-        if away(near) > _APART_M + LIMITS.walking_m_s * (found.at - near.at):
-            return found
+            return newest
+        if away(near) > _APART_M + LIMITS.walking_m_s * (newest.at - near.at):
+            return newest
         earlier.remove(near)
-        return near.seen_again(found)
+        return near.seen_again(newest)
 
     def _measured(self, body: _Floats, pose: Pose2D, now: float) -> Obstacle:
-        """Neighbouring returns as an obstacle that is seen for the first time."""
+        """A new obstacle from neighbouring returns."""
         x, y = body.mean(0).tolist()
-        ahead, aside = pose.inverse(*body.T)
+        along, aside = pose.inverse(*body.T)
         size_m = float(np.hypot(*np.ptp(body, axis=0)))
-        gap_m = float(self._outline.gap_to(ahead, aside).min())
-        beside = float(ahead.mean()), float(aside.mean())
+        gap_m = float(self._outline.gap_to(along, aside).min())
+        beside = float(along.mean()), float(aside.mean())
         here = x, y
         return Obstacle(here, here, beside, beside, size_m, gap_m, now, now)
 
 
 def _bodies(points: _Floats) -> Sequence[_Floats]:
-    """Neighbouring returns, in the order of the beams, as one body each."""
+    """Bodies: groups of neighbouring returns, in the order of the beams."""
     if not len(points):
         return ()
-    steps = np.hypot(*np.diff(points, axis=0).T)
-    parts = np.split(points, np.flatnonzero(steps > _APART_M) + 1)
+    distances = np.hypot(*np.diff(points, axis=0).T)
+    parts = np.split(points, np.flatnonzero(distances > _APART_M) + 1)
     # A sweep may begin in the middle of a body.
     if len(parts) > 1 and math.dist(points[-1], points[0]) <= _APART_M:
         parts = [np.concatenate((parts[-1], parts[0])), *parts[1:-1]]
-    return [one for one in parts if len(one) >= _LEAST_RETURNS]
+    return [part for part in parts if len(part) >= _LEAST_RETURNS]

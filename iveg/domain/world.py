@@ -1,9 +1,9 @@
-"""The world as iVeg knows it: every robot with the age of everything about it.
+"""The world as iVeg knows it: every robot, with the age of its data.
 
-``World.apply`` takes one observation; older ones and twins change nothing and are
-counted.  Nothing here reads a clock: ages come from the ``now`` that is handed in.
-Beside it stands what it judges by: the ledger of feedback, whose echoes prove ages;
-what contradicts physics; and other servers' feedback.
+``World.apply`` takes one observation; late ones and copies change nothing and are
+counted.  Nothing here reads a clock: ages are measured from the argument ``now``.
+Beside it are the ledger of feedback, whose echoes prove ages, the contradictions with
+physics, and the feedback of other servers.
 """
 
 from bisect import bisect_right
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Literal
 
+from iveg.domain.detector import WordAnswers
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.fleet import FleetDescription, RobotDescription
 from iveg.domain.frames import is_pose_frame
@@ -35,32 +36,39 @@ from iveg.domain.observations import (
     kind_of,
 )
 from iveg.domain.probe import ProbeLag
-from iveg.domain.robot_state import RobotState, apply_newest, dated, learn_kind
-from iveg.domain.stream_order import OrderVerdict
+from iveg.domain.robot_state import (
+    RobotState,
+    dated,
+    learn_kind,
+    note_motion,
+    store,
+)
+from iveg.domain.stream_order import Freshness
 from iveg.domain.transports import FIWARE
-from iveg.domain.words import WordAnswers
 
 # --- proven age -------------------------------------------------------------------
 #
-# Robots name in every message the newest feedback that they have received.  What was
-# measured after that feedback arrived was measured after it left iVeg, so the message
-# is at most as old as the feedback is now, on iVeg's own monotonic clock.  No clock of
-# the robot enters and no delay is guessed (docs/safety.md, "Age").
+# Robots name in every message the newest feedback that they have received.  The message
+# was measured after that feedback left iVeg.  So it is at most as old as the feedback
+# is now, on iVeg's own monotonic clock, without a clock of the robot or a guessed delay
+# (docs/safety.md, "Age").
 
 _APART_S = 0.05
-"""Moments closer than this share the earlier one, so that ages come out older."""
-_MOST = 36_000
-"""Moments; the older half of them, fifteen minutes at least, goes then."""
+"""Closer moments share the earlier moment, which makes ages greater (s)."""
+_MOST_KEPT = 36_000
+"""Number at which the older half is dropped: fifteen minutes at least."""
 
 
 class FeedbackLedger:
-    """Remembers when each feedback message was composed."""
+    """Times at which feedback messages were composed."""
 
     def __init__(self) -> None:
         self._boot: str | None = None
         self._firsts: list[int] = []
+        """First count at each of the moments."""
         self._moments: list[float] = []
         self._last = -1
+        """Newest count that was composed."""
 
     def composed(self, boot: str, first: int, last: int, now: float) -> None:
         """Record that feedback ``first`` to ``last`` is composed now (monotonic, s)."""
@@ -69,71 +77,73 @@ class FeedbackLedger:
             return
         self._firsts.append(first)
         self._moments.append(now)
-        if len(self._moments) > _MOST:
-            del self._firsts[: _MOST // 2], self._moments[: _MOST // 2]
+        if len(self._moments) > _MOST_KEPT:
+            del self._firsts[: _MOST_KEPT // 2], self._moments[: _MOST_KEPT // 2]
 
     def is_sent(self, echo: FeedbackRef) -> bool:
-        """Whether this boot has sent that feedback."""
+        """Whether this run of iVeg has sent that feedback."""
+        # A count above ours is forged or of another server: it proves nothing.
         return echo.boot == self._boot and echo.seq <= self._last
 
     def composed_at(self, *echoes: FeedbackRef) -> float | None:
-        """The moment when the newest of these was composed, or earlier (monotonic, s).
+        """Lower bound of the time at which the newest was composed (monotonic, s).
 
-        None where nothing is proven: all are of other authors, were never sent, or are
-        forgotten.
+        None: all are of other authors, were never sent, or are forgotten.
         """
-        sent = [one.seq for one in echoes if self.is_sent(one)]
-        index = bisect_right(self._firsts, max(sent, default=-1)) - 1
+        counts = [echo.seq for echo in echoes if self.is_sent(echo)]
+        index = bisect_right(self._firsts, max(counts, default=-1)) - 1
         return None if index < 0 else self._moments[index]
 
 
-_SILENT_S = 1.0
-"""A direct copy older than this is missed."""
+_DIRECT_FRESH_S = 1.0
+"""Time after a direct message in which Orion's is taken for its copy (s)."""
 
 # --- contradictions ---------------------------------------------------------------
 #
-# Whether what a robot says can be true: by physics, and by what it said before.  Only
-# news is compared, and the longer of the robot's time and ours counts, so that lateness
-# and reordering are no contradictions.  docs/safety.md, "Doubt", has the table.
+# Whether an observation can be true: by physics, and by earlier observations of the
+# robot.  Only new messages are compared, and the longer of the robot's time and ours
+# counts, so that lateness and reordering are no contradictions.  docs/safety.md,
+# "Doubt", has the table.
 
 Code = Literal["pose_outside", "too_fast", "jumped"]
 """Contradictions, beside those of :mod:`~iveg.domain.motion`."""
 
 ANY_ROBOT_M_S, ANY_ROBOT_RAD_S = 10.0, 10.0
-"""Faster than any robot in a greenhouse: the bound of one that nobody described."""
+"""Bounds of a robot without description: faster than any robot in a greenhouse."""
 _SPEED_SHARE, _SPEED_M_S = 1.25, 0.25
-"""A drive may overshoot its greatest speed by this, and odometry is noisy (1, m/s)."""
+"""Overshoot of a drive over its greatest speed, and noise of odometry (1, m/s)."""
 _TURN_SHARE, _TURN_RAD_S = 1.5, 0.5
+"""Likewise for the turn rate (1, rad/s)."""
 _JUMP_M = 0.5
-"""Corrections of a localisation are smaller (m)."""
+"""Bound of the corrections of a localisation (m)."""
 _ANCHOR_S = 1.0
-"""Poses are compared over so long, so that many small steps add up."""
-_LATE_S = 10.0
-"""A message may be so much later than the next one; a clock that tells more leapt."""
+"""Time over which poses are compared, so that many small steps add up (s)."""
+_MOST_DELAY_S = 10.0
+"""Greatest difference of two delays; a clock that shows more was set (s)."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Anchor:
-    """A pose that later ones are compared with; ``at`` when it came (monotonic, s)."""
+    """Odometry that later poses are compared with; ``at``: arrival (monotonic, s)."""
 
-    said: Odometry
+    odometry: Odometry
     at: float
 
     def passed_s(self, later: Origin, now: float) -> float:
-        """Longest time since it was measured, when ``later`` was (s)."""
-        earlier, arrived = self.said.origin, now - self.at
+        """Greatest time between the measurements of this and ``later`` (s)."""
+        earlier, arrived_s = self.odometry.origin, now - self.at
+        longest_s = arrived_s + _MOST_DELAY_S
         if earlier.seq is None or later.seq is None:
-            return arrived + _LATE_S  # whoever does not count may come in any order
-        own = _own_s_between(earlier, later)
-        return arrived if own is None else max(arrived, min(own, arrived + _LATE_S))
+            return longest_s  # Without a count messages may come in any order.
+        own_s = _own_s_between(earlier, later)
+        return arrived_s if own_s is None else max(arrived_s, min(own_s, longest_s))
 
 
 class Plausibility:
-    """Judges what the robots of a fleet say.
+    """Judge of the observations of a fleet's robots.
 
     Args:
-        bounds: Of the greenhouse and what around it robots may use; None: nobody knows
-            where its robots may be.
+        bounds: The area in which robots may be, in ``map``; None: unknown.
     """
 
     def __init__(self, bounds: Rectangle | None) -> None:
@@ -141,31 +151,36 @@ class Plausibility:
         self._anchors: dict[str, _Anchor] = {}
 
     def contradictions(self, robot: RobotState, received: Received) -> Iterator[Code]:
-        """Codes of what news contradicts in the robot's state before this message."""
+        """Codes of the contradictions of a new message with the state before it."""
         description = robot.description
         match received.observation:
-            case Odometry() as said:
-                bounds, pose = self._bounds, said.pose
+            case Odometry() as odometry:
+                bounds, pose = self._bounds, odometry.pose
                 if bounds is not None and not bounds.contains(pose.x, pose.y):
                     yield "pose_outside"
-                if _is_too_fast(description, said.twist):
+                if _is_too_fast(description, odometry.twist):
                     yield "too_fast"
-                if self._has_jumped(description, said, received.at.mono):
+                if self._has_jumped(description, odometry, received.at.mono):
                     yield "jumped"
             case SafetyReport(linear=linear, angular=angular):
                 if _is_too_fast(description, Twist2D(linear, angular)):
                     yield "too_fast"
 
-    def _has_jumped(self, robot: RobotDescription, said: Odometry, at: float) -> bool:
-        """Whether it cannot have come here since an earlier pose of the same boot."""
-        anchor = self._anchors.get(said.robot_id)
-        if anchor is None or anchor.said.origin.boot != said.origin.boot:
-            self._anchors[said.robot_id] = _Anchor(said, at)
+    def _has_jumped(
+        self, robot: RobotDescription, odometry: Odometry, at: float
+    ) -> bool:
+        """Whether it cannot have driven here from an earlier pose of this boot."""
+        anchor, pose = self._anchors.get(odometry.robot_id), odometry.pose
+        if anchor is None or anchor.odometry.origin.boot != odometry.origin.boot:
+            self._anchors[odometry.robot_id] = _Anchor(odometry, at)
             return False
-        reach = _most_speed(robot) * anchor.passed_s(said.origin, at) + _JUMP_M
-        jumped = anchor.said.pose.distance_to(said.pose.x, said.pose.y) > reach
+        reach_m = (
+            _greatest_speed(robot) * anchor.passed_s(odometry.origin, at) + _JUMP_M
+        )
+        jumped = anchor.odometry.pose.distance_to(pose.x, pose.y) > reach_m
+        # After a jump the new place is believed: a relocalisation jumps only once.
         if jumped or at - anchor.at >= _ANCHOR_S:
-            self._anchors[said.robot_id] = _Anchor(said, at)
+            self._anchors[odometry.robot_id] = _Anchor(odometry, at)
         return jumped
 
 
@@ -173,90 +188,94 @@ def _is_too_fast(robot: RobotDescription, twist: Twist2D) -> bool:
     turn = ANY_ROBOT_RAD_S
     if robot.is_described:
         turn = _TURN_SHARE * robot.profile.max_turn + _TURN_RAD_S
-    return abs(twist.linear_x) > _most_speed(robot) or abs(twist.angular_z) > turn
+    return abs(twist.linear_x) > _greatest_speed(robot) or abs(twist.angular_z) > turn
 
 
-def _most_speed(robot: RobotDescription) -> float:
-    """Speed above which no such robot drives, noise included (m/s)."""
+def _greatest_speed(robot: RobotDescription) -> float:
+    """Greatest speed of such a robot, noise included (m/s)."""
     if not robot.is_described:
         return ANY_ROBOT_M_S
     return _SPEED_SHARE * robot.profile.max_speed + _SPEED_M_S
 
 
 def _own_s_between(earlier: Origin, later: Origin) -> float | None:
-    """Seconds between two messages on the robot's own clock; None where unknown."""
+    """Time between two messages on the robot's own clock (s); None: unknown."""
     if (earlier.mono is None) != (later.mono is None):
         return None
-    then, now = earlier.own_s, later.own_s
-    return None if then is None or now is None else now - then
+    earlier_s, now = earlier.own_s, later.own_s
+    return None if earlier_s is None or now is None else now - earlier_s
 
 
 # --- other servers ----------------------------------------------------------------
 #
-# Two authors steer one fleet where a robot hears feedback that this iVeg never sent,
-# and goes on hearing more of it.  An earlier run of this iVeg says nothing more, so it
-# is none.  One robot's word is enough, as it slows nobody and frees nobody.
+# A robot that keeps receiving new feedback from elsewhere has a second author.  An
+# earlier run of this iVeg sends nothing new, so it is none.  One robot's report is
+# enough, since it slows nobody and frees nobody.
 
 SPOKEN_FOR_S = 3.0
-"""An earlier run may end that much after this one began."""
+"""Least time that an author goes on (s): our earlier run may end after our start."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Heard:
-    """Feedback of others that one robot hears: newest counts, first and last news.
+class _OtherFeedback:
+    """Feedback of other authors that one robot receives.
 
     Attributes:
-        news: When it first heard of them (monotonic, s), and last anything new.
+        counts: Boot of an author → its newest count.
+        began: First report of any (monotonic, s).
+        newest: Last report of anything new (monotonic, s).
     """
 
-    others: dict[str, int]
-    news: tuple[float, float]
+    counts: dict[str, int]
+    began: float
+    newest: float
 
 
 class OtherAuthors:
-    """Authors of feedback beside this iVeg; ``ledger`` knows what it sent itself."""
+    """Authors of feedback beside this iVeg; ``ledger`` has its own feedback."""
 
     def __init__(self, ledger: FeedbackLedger) -> None:
         self._ledger = ledger
-        self._heard: dict[str, _Heard] = {}
+        self._received: dict[str, _OtherFeedback] = {}
 
     def note(
         self, robot_id: str, origin: Origin, at: Instant, *, is_direct: bool
     ) -> None:
-        """Take what a robot echoes; what may be from before our start is left out."""
+        """Take the echoes of a robot, but for those that may precede our start."""
         proven_at = self._ledger.composed_at(*origin.echoes)
         if not is_direct and (proven_at is None or at.mono - proven_at > LIMITS.late_s):
             return
-        sent = [one for one in origin.echoes if self._ledger.is_sent(one)]
+        sent_echoes = [echo for echo in origin.echoes if self._ledger.is_sent(echo)]
         # A second count in our own name is another's.
-        ours = max(sent, key=lambda one: one.seq, default=None)
-        others = {one.boot: one.seq for one in origin.echoes if one != ours}
-        before = self._heard.get(robot_id)
-        if not others:
-            self._heard.pop(robot_id, None)
+        newest = max(sent_echoes, key=lambda echo: echo.seq, default=None)
+        counts = {echo.boot: echo.seq for echo in origin.echoes if echo != newest}
+        before = self._received.get(robot_id)
+        if not counts:
+            self._received.pop(robot_id, None)
         elif before is None:
-            self._heard[robot_id] = _Heard(others, (at.mono, at.mono))
-        elif any(seq > before.others.get(boot, -1) for boot, seq in others.items()):
-            self._heard[robot_id] = _Heard(others, (before.news[0], at.mono))
+            self._received[robot_id] = _OtherFeedback(counts, at.mono, at.mono)
+        elif any(seq > before.counts.get(boot, -1) for boot, seq in counts.items()):
+            self._received[robot_id] = _OtherFeedback(counts, before.began, at.mono)
 
     def speaking(self, now: Instant) -> list[str]:
-        """Boots of those that have gone on for 3 s and spoke within the last ten."""
+        """Boots of authors that went on for 3 s and spoke within the last 10 s."""
         return sorted(
             {
                 boot
-                for one in self._heard.values()
-                if one.news[1] - one.news[0] >= SPOKEN_FOR_S
-                and now.mono - one.news[1] <= LIMITS.zone_lasts_s
-                for boot in one.others
+                for feedback in self._received.values()
+                if feedback.newest - feedback.began >= SPOKEN_FOR_S
+                and now.mono - feedback.newest <= LIMITS.zone_lasts_s
+                for boot in feedback.counts
             }
         )
 
 
 # --- the world --------------------------------------------------------------------
 
-_NO_MESSAGE = Climate, HeartbeatProbe, RefusedFrame
-"""Observations that are in no robot's stream of messages."""
-_ASKED_AGE_S = LIMITS.late_s + 0.1
+_UNORDERED = Climate, HeartbeatProbe, RefusedFrame
+"""Observations that belong to no robot's stream of messages."""
+_ANSWER_AGE_S = LIMITS.late_s + 0.1
+"""Least age of Orion's answer to a query (s): it never looks live or late, but lost."""
 
 
 class World:
@@ -264,13 +283,17 @@ class World:
 
     Args:
         fleet: Its robots; ids alone are robots without a description.
-        probe: Lag of FIWARE; without one FIWARE's lag is not used.
-        bounds: Where robots may be; without them anywhere.
+        probe: Lag of FIWARE; None: the lag is not used.
+        bounds: Area in which robots may be, in ``map``; None: anywhere.
 
     Attributes:
-        returned_detectors: Whose detector a boot has put back in service, until read.
-        word_answers: What operators said of words of detectors.
-        ledger: When iVeg's own feedback was composed, which robots echo.
+        robots: State of each robot, by id.
+        climate: Newest air of the greenhouse; ``climate_received``: its arrival.
+        counters: Number of messages by kind and freshness, and of contradictions.
+        returned_detectors: Robots whose boot put their detector back in service, until
+            they are read.
+        word_answers: Answers of operators about words of detectors.
+        ledger: Times at which iVeg's own feedback was composed.
         other_authors: Other servers whose feedback robots echo.
     """
 
@@ -285,8 +308,8 @@ class World:
         if not isinstance(fleet, FleetDescription):
             fleet = FleetDescription.undescribed(fleet)
         self.robots = {
-            robot_id: RobotState(robot_id, one)
-            for robot_id, one in fleet.members.items()
+            robot_id: RobotState(robot_id, description)
+            for robot_id, description in fleet.members.items()
         }
         self._plausibility = Plausibility(bounds)
         self.other_authors = OtherAuthors(self.ledger)
@@ -296,7 +319,7 @@ class World:
         self._direct_at: dict[tuple[str, type[Observation]], float] = {}
         """Arrival of the newest direct message by robot and kind (monotonic, s)."""
         self.returned_detectors: list[str] = []
-        self.word_answers = WordAnswers()
+        self.word_answers = WordAnswers(self.robots)
 
     def robot(self, robot_id: str) -> RobotState:
         """One robot.
@@ -310,12 +333,12 @@ class World:
             raise UnknownRobotError(robot_id) from None
 
     def is_refused(self, robot_id: str) -> bool:
-        """Whether a setting says that a robot is not heard."""
+        """Whether a setting says that a robot is ignored."""
         robot = self.robots.get(robot_id)
         return robot is not None and robot.refused
 
     def misplaced(self, observation: Observation) -> str | None:
-        """Name of the frame that odometry is in, if that is not its robot's."""
+        """Frame of odometry that is not its robot's pose frame; None: it fits."""
         frame = observation.frame_id if isinstance(observation, Odometry) else None
         if frame is None or is_pose_frame(
             frame, self.robot(observation.robot_id).description
@@ -323,85 +346,103 @@ class World:
             return None
         return frame
 
-    def apply(self, received: Received) -> OrderVerdict:
-        """Take one observation in.
+    def apply(self, received: Received) -> Freshness:
+        """Take one observation.
 
         Returns:
-            ``new`` when it became the state, else why it did not.
+            ``new`` when it became the state, else its other freshness.
 
         Raises:
             UnknownRobotError: from a robot that is not in the fleet.
         """
         observation, at = received.observation, received.at
-        if isinstance(observation, _NO_MESSAGE):
-            return self._note(observation, at)
+        if isinstance(observation, _UNORDERED):
+            return self._note_unordered(observation, at)
         robot = self.robot(observation.robot_id)
         origin = observation.origin
         if self.refuses(received):
-            # What Orion kept may be of a time when the robot was a recording.
-            robot.refused_at = robot.refused_at if received.asked else at.mono
+            # Orion's answer may be from a time when the robot was a recording.
+            robot.refused_at = robot.refused_at if received.is_query_answer else at.mono
             self.counters[f"{kind_of(observation).__name__}.refused"] += 1
             return "refused"
+        if received.is_query_answer:
+            return self._restore(robot, received)
         if received.alone:
+            # It may be retained and of any age: it protects, but changes no state.
             robot.sighted_at = at
             return "late"
         learn_kind(robot, received, origin)
-        verdict = robot.judge(received, origin, self.ledger.composed_at(*origin.echoes))
-        if not received.asked:
-            verdict = self._fed(received, verdict)
-        self.counters[f"{kind_of(observation).__name__}.{verdict}"] += 1
-        if verdict == "duplicate" or (received.asked and origin.seq is None):
+        proven_at = self.ledger.composed_at(*origin.echoes)
+        freshness = robot.judge(received, origin, proven_at)
+        freshness = self._without_copies(received, freshness)
+        self.counters[f"{kind_of(observation).__name__}.{freshness}"] += 1
+        if freshness == "duplicate":
             return "duplicate"
-        if not received.asked:
-            self._hear(robot, origin, at)
+        # The robot's next boot puts its detector back in service.
+        if robot.detector.meet_boot(origin.boot):
+            self.returned_detectors.append(robot.robot_id)
         likely = self._likely_age(robot, received, origin)
+        moment = _measured_at(origin, at, likely, proven_at)
         if isinstance(observation, DetectionFrame):
-            seen_at = self._measured_at(origin, received, likely)
-            if seen_at is None:
-                # A person counts, though the age of the frame is not proven.
-                seen_at = at.mono - (likely or 0.0)
+            # A person counts even if the age of the frame is not proven.
+            seen_at = at.mono - (likely or 0.0) if moment is None else moment
             robot.sighted_at = dated(at, seen_at)
-        if verdict == "new":
-            self._take(robot, received, self._measured_at(origin, received, likely))
-        return verdict
+        if freshness == "new":
+            self._take(robot, received, moment)
+        return freshness
+
+    def _restore(self, robot: RobotState, received: Received) -> Freshness:
+        """Store Orion's answer to a query where it is newer than all that is known.
+
+        It is of any time: it shows no motion, contradicts nothing and is never live.
+        """
+        observation, at = received.observation, received.at
+        origin = observation.origin
+        proven_at = self.ledger.composed_at(*origin.echoes)
+        if origin.seq is None or robot.judge(received, origin, proven_at) != "new":
+            return "duplicate"
+        self.counters[f"{kind_of(observation).__name__}.stored"] += 1
+        stamped_s = 0.0 if origin.stamp_s is None else at.wall - origin.stamp_s
+        likely = at.later(-max(stamped_s, _ANSWER_AGE_S))
+        moment = proven_at if origin.acknowledgements else likely.mono
+        if isinstance(observation, DetectionFrame):
+            robot.sighted_at = likely
+        store(robot, received, None if moment is None else min(moment, likely.mono))
+        return "stored"
 
     def _take(
         self, robot: RobotState, received: Received, moment: float | None
     ) -> None:
-        """Take the newest of its kind in, and note what it contradicts.
-
-        A recording may jump as it likes, and Orion's answer is of any time.
-        """
-        at, origin = received.at, received.observation.origin
-        is_checked = not (robot.is_replay or received.asked)
-        if not received.asked:
-            is_direct = received.transport != FIWARE.id
-            self.other_authors.note(robot.robot_id, origin, at, is_direct=is_direct)
-        if is_checked:
+        """Store the newest observation of its kind, and note its contradictions."""
+        observation, at = received.observation, received.at
+        self.other_authors.note(
+            robot.robot_id,
+            observation.origin,
+            at,
+            is_direct=received.transport != FIWARE.id,
+        )
+        # Before it is stored, since it is compared with the state before it.
+        # A recording may jump when it begins anew.
+        if not robot.is_replay:
             for code in self._plausibility.contradictions(robot, received):
                 self._doubt(robot, code, at)
-        apply_newest(robot, received, moment)
+        store(robot, received, moment)
+        note_motion(robot, observation, at, moment)
         moved = robot.motion(at).contradiction
-        if is_checked and moved and isinstance(received.observation, Odometry):
+        if not robot.is_replay and moved and isinstance(observation, Odometry):
             self._doubt(robot, moved, at, LASTED_S)
 
     def _doubt(
         self, robot: RobotState, code: str, at: Instant, lasted_s: float = 0.0
     ) -> None:
-        """Note what a robot says that contradicts itself or physics."""
+        """Note a contradiction of a robot with itself or physics."""
         robot.doubts.contradicted(code, at, lasted_s)
         self.counters[f"contradicted.{code}"] += 1
 
-    def _hear(self, robot: RobotState, origin: Origin, at: Instant) -> None:
-        """Note that a robot speaks; its next boot puts its detector back in service."""
-        robot.heard_at = at.mono
-        if robot.detector.meet_boot(origin.boot):
-            self.returned_detectors.append(robot.robot_id)
-
-    def _note(
+    def _note_unordered(
         self, observation: Climate | HeartbeatProbe | RefusedFrame, at: Instant
-    ) -> OrderVerdict:
-        """Note what is in no stream."""
+    ) -> Freshness:
+        """Note an observation that belongs to no stream."""
         match observation:
             case Climate():
                 self.climate, self.climate_received = observation, at
@@ -415,7 +456,7 @@ class World:
     def refuses(self, received: Received) -> bool:
         """Whether a message calls itself a replay while its robot is live.
 
-        Nothing of it counts: whoever plays it is not that robot.
+        Such a message does not count: its sender is not that robot.
         """
         observation = received.observation
         if observation.origin.replay is None:
@@ -426,60 +467,41 @@ class World:
     def _likely_age(
         self, robot: RobotState, received: Received, origin: Origin
     ) -> float | None:
-        """Age of a message when it came, by its stamp and our probe (s)."""
+        """Age of a message on arrival by its stamp and our probe (s); None: unknown."""
         at = received.at
-        if received.asked:
-            return _age_when_asked(origin, at)
         lag: float | None = 0.0
         if self._probe is not None:
             lag = self._probe.lag(at) if self._probe.is_known else None
-        kind = kind_of(received.observation)
-        return robot.clock.delay(kind, origin, at, received.transport, lag)
-
-    def _measured_at(
-        self, origin: Origin, received: Received, likely: float | None
-    ) -> float | None:
-        """Lower bound of the measurement time (monotonic, s); None: nobody knows.
-
-        Of a robot that echoes only a proof counts.
-        """
-        now = received.at.mono
-        moment = None if likely is None else now - likely
-        if origin.acknowledgements:
-            moment = self.ledger.composed_at(*origin.echoes)
-        if moment is None:
-            return None
-        return min(moment, now - (_ASKED_AGE_S if received.asked else 0.0))
+        return robot.clock.delay(
+            kind_of(received.observation), origin, at, received.transport, lag
+        )
 
     def age_then(self, received: Received) -> float:
-        """Greatest age of the newest of its kind when it came (s).
+        """Greatest age of the newest of its kind on arrival (s).
 
-        Infinite where nobody knows, and for odometry whose age is only estimated: an
-        estimate proves nothing.
+        Infinite if that is unknown, or for odometry of estimated age: an estimate
+        proves nothing.
         """
         moment = self._newest_at(received.observation)
         return inf if moment is None else max(0.0, received.at.mono - moment)
 
     def may_act(self, received: Received) -> bool:
-        """Whether the newest of its kind may change anything of a STOP.
+        """Whether the newest of its kind may act on a STOP.
 
-        Not what Orion kept, nor a replay of a live robot; of a robot that echoes no
-        report or odometry of an earlier boot.  An answer names its order, and so is of
-        no time before it.
+        From a robot that echoes, no report or odometry of an earlier boot may.  An
+        answer of the robot names its order, so it cannot be older than that.
         """
-        if received.asked or self.refuses(received):
-            return False
         observation = received.observation
         if not isinstance(observation, SafetyReport | Odometry):
             return True
         origin, proven_at = observation.origin, self._newest_at(observation)
         if not origin.acknowledgements:
-            return True  # Its age is an estimate, which is judged where it matters.
+            return True  # Its age is an estimate; the STOP machine judges that.
         present_boot = self.robot(observation.robot_id).present_boot
         return not present_boot.is_past(origin.boot, proven_at)
 
     def _newest_at(self, observation: Observation) -> float | None:
-        """Lower bound of when the newest of this kind was measured (monotonic, s)."""
+        """Lower bound of the newest report's or odometry's time (monotonic, s)."""
         if isinstance(observation, SafetyReport):
             reported = self.robot(observation.robot_id).safety_received
             return None if reported is None else reported.mono
@@ -488,25 +510,31 @@ class World:
             return robot.pose_at if robot.estimated_since is None else None
         return None
 
-    def _fed(self, received: Received, verdict: OrderVerdict) -> OrderVerdict:
-        """The verdict; without a count Orion's copy of a direct message is none."""
+    def _without_copies(self, received: Received, freshness: Freshness) -> Freshness:
+        """The freshness; ``duplicate``: Orion's copy of an uncounted direct message."""
         observation, at = received.observation, received.at.mono
         key = observation.robot_id, kind_of(observation)
         if key[1] not in (Odometry, LaserScan):
-            return verdict
+            return freshness
         if received.transport != FIWARE.id:
             self._direct_at[key] = at
         elif observation.origin.seq is None:
             direct_at = self._direct_at.get(key, -inf)
-            return "duplicate" if at - direct_at <= _SILENT_S else verdict
-        return verdict
+            return "duplicate" if at - direct_at <= _DIRECT_FRESH_S else freshness
+        return freshness
 
     def live_robots(self) -> Iterable[RobotState]:
-        """Robots that are not recordings."""
+        """All robots but recordings."""
         return (robot for robot in self.robots.values() if not robot.is_replay)
 
 
-def _age_when_asked(origin: Origin, at: Instant) -> float:
-    """Least age of Orion's answer (s): nothing that was asked for looks live."""
-    stamped = 0.0 if origin.stamp_s is None else at.wall - origin.stamp_s
-    return max(stamped, _ASKED_AGE_S)
+def _measured_at(
+    origin: Origin, at: Instant, likely: float | None, proven_at: float | None
+) -> float | None:
+    """Lower bound of the measurement time (monotonic, s); None: unknown.
+
+    For a robot that echoes only a proof counts.
+    """
+    if origin.acknowledgements:
+        return None if proven_at is None else min(proven_at, at.mono)
+    return None if likely is None else at.mono - max(likely, 0.0)

@@ -1,1 +1,1 @@
-"""Laboratory: what stands in for robots, brokers and people, beside the product."""
+"""Laboratory: stand-ins for robots, brokers and people, beside the product."""

@@ -2,17 +2,14 @@
 
 from typing import Literal, Self
 
-from pydantic import Field
-
 from iveg.domain.accounts import (
     Account,
     AccountState,
     ApiToken,
-    PersonRole,
     SignInMethod,
-    TokenScope,
 )
-from iveg.models.base import Model, Stamp
+from iveg.domain.audit import Actor
+from iveg.models.base import Model, Stamp, members_of
 
 SessionKind = Literal["link", "account"]
 
@@ -29,20 +26,23 @@ class SignInCode(Model):
     image: str
 
 
+@members_of(Actor, "name", "role")
 class OwnAccount(Model):
-    """Whoever asks, as they are known here.
+    """Account, link or token of the caller.
 
     Attributes:
-        name: As in all that they do.
-        role: As in all that they do.
+        name: Name in log and audit.
+        role: Role, which says what they may do.
+        method: How they signed in.
+        account: They have one; else a link or a token.
+        signed_in_at: Null for programs.
+        ends_at: When it ends by itself; null: never.
     """
 
-    name: str
-    role: str
-    method: SignInMethod = Field(description="How they came in.")
-    account: bool = Field(description="They have one; else a link or a token.")
-    signed_in_at: Stamp | None = Field(description="Null for programs.")
-    ends_at: Stamp | None = Field(description="When it ends by itself; null: never.")
+    method: SignInMethod
+    account: bool
+    signed_in_at: Stamp | None
+    ends_at: Stamp | None
 
 
 class OpenSession(Model):
@@ -51,18 +51,21 @@ class OpenSession(Model):
     Its id lets nobody in.
 
     Attributes:
+        role: Role that is left now; ``expired``: STOP alone.
         kind: How they signed in.
         began_at: The sign-in.
+        own: It is the caller's own session.
     """
 
     session_id: str
     name: str
-    role: str = Field(description="That is left now; `expired`: STOP alone.")
+    role: str
     kind: SessionKind
     began_at: Stamp
-    own: bool = Field(description="The one that asks.")
+    own: bool
 
 
+@members_of(Account, "name", "role")
 class UserAccount(Model):
     """An account, as admins see it.
 
@@ -70,27 +73,28 @@ class UserAccount(Model):
         user_id: The id is never given anew.
         name: The id is never given anew.
         state: ``over``: it ended by itself.
+        ends_at: When it ends by itself; null: never.
+        invited_until: Null where no invitation waits.
+        own: It is the caller's own, which only another admin may change.
+        provided: The identity provider vouches for the person and gives the role.
     """
 
     user_id: str
-    name: str
-    role: PersonRole
     state: AccountState
-    ends_at: Stamp | None = Field(description="When it ends by itself; null: never.")
-    invited_until: Stamp | None = Field(description="Null where no invitation waits.")
-    own: bool = Field(description="Of whoever asks: another admin changes it.")
-    provided: bool = Field(
-        description="The identity provider vouches for the person and gives the role."
-    )
+    ends_at: Stamp | None
+    invited_until: Stamp | None
+    own: bool
+    provided: bool
 
     @classmethod
-    def of(cls, account: Account, now: float, *, own: bool = False) -> Self:
-        """As it is at this moment (Unix s)."""
+    def from_account(cls, account: Account, now: float, *, own: bool = False) -> Self:
+        """An account at this moment (Unix s)."""
         state = account.state(now)
         return cls.from_value(
             account,
             user_id=account.account_id,
             state=state,
+            # An invitation that was used or has ended leaves its time in the account.
             invited_until=account.invited_until if state == "invited" else None,
             own=own,
             provided=bool(account.provider),
@@ -102,14 +106,14 @@ class Invitation(Model):
 
     Attributes:
         user: The account.
+        code: Null for a person of the identity provider.
     """
 
     user: UserAccount
-    code: SignInCode | None = Field(
-        description="Null for somebody whom the identity provider vouches for."
-    )
+    code: SignInCode | None
 
 
+@members_of(ApiToken, "token_id", "name", "scope")
 class ProgramToken(Model):
     """A program that may call, as admins see it.
 
@@ -120,19 +124,19 @@ class ProgramToken(Model):
         token_id: The id is never given anew.
         name: The id is never given anew.
         scope: ``stop`` reads, too; ``operate`` does what an operator may.
+        used_at: The last time; null: never.
+        ends_at: When it ends by itself; null: never.
+        over: It has ended by itself.
     """
 
-    token_id: str
-    name: str
-    scope: TokenScope
     made_at: Stamp
-    used_at: Stamp | None = Field(description="The last time; null: never.")
-    ends_at: Stamp | None = Field(description="When it ends by itself; null: never.")
-    over: bool = Field(description="It has ended by itself.")
+    used_at: Stamp | None
+    ends_at: Stamp | None
+    over: bool
 
     @classmethod
-    def of(cls, token: ApiToken, now: float) -> Self:
-        """As it is at this moment (Unix s)."""
+    def from_token(cls, token: ApiToken, now: float) -> Self:
+        """A program's token at this moment (Unix s)."""
         return cls.from_value(token, over=not token.is_open(now))
 
 

@@ -1,8 +1,19 @@
-"""Base of all models, and what many are made of: moments, places (m), scans."""
+"""Base of all models, and parts that many share: moments, places (m), scans."""
 
-from collections.abc import Callable
+import inspect
+import re
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Final, Generic, Self, TypeVar
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Final,
+    Generic,
+    Self,
+    TypeVar,
+    get_type_hints,
+)
 
 import orjson
 from pydantic import (
@@ -16,8 +27,8 @@ from pydantic import (
     create_model,
 )
 
-from iveg.domain.geometry import Twist2D
-from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.geometry import Pose2D, Rectangle, Twist2D
+from iveg.domain.greenhouse import Greenhouse, StructuralPost
 from iveg.domain.observations import Instant
 from iveg.domain.records import SHOWN_COLUMNS, Column
 from iveg.domain.stamps import format_stamp
@@ -26,21 +37,49 @@ Slots = dict[str, str | bool | int | float | None]
 """Values of the ``{named}`` placeholders of a sentence."""
 
 
+_MEANING: Final = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.M)
+"""A row below "Attributes" in a docstring."""
+
+
+def describe(schema: dict[str, Any], model: type[BaseModel]) -> None:
+    """Describe the keys of a JSON schema by the "Attributes" of its model."""
+    meanings: dict[str, str] = {}
+    # The model itself comes last, so that its words replace those of its bases.
+    for base in reversed(model.__mro__):
+        doc = inspect.cleandoc(base.__doc__ or "")
+        schema["description"], _, rows = doc.partition("\n\nAttributes:")
+        meanings |= dict(_MEANING.findall(rows))
+    for name, about in model.model_fields.items():
+        shown = schema["properties"][about.serialization_alias or name]
+        if name in meanings:
+            shown["description"] = in_line(meanings[name])
+
+
+def in_line(text: str) -> str:
+    """A docstring's text in Markdown, on one line."""
+    return " ".join(text.replace("``", "`").split())
+
+
 class Model(BaseModel):
-    """Base of all resources; lengths in metres, angles in radians, ages in seconds."""
+    """Base of all resources; lengths in metres, angles in radians, ages in seconds.
+
+    A field's meaning and unit stand below "Attributes" in the docstring of its model.
+    """
 
     model_config = ConfigDict(
+        json_schema_extra=describe,
         frozen=True,
         from_attributes=True,
         extra="forbid",
         serialize_by_alias=True,
+        # Python's own words, such as ``class``, are aliases: both names can be given.
         validate_by_alias=True,
         validate_by_name=True,
     )
 
     @classmethod
     def from_value(cls, source: object, **other: Any) -> Self:
-        """Make it of a value whose members have its names; ``other`` has the rest."""
+        """Read fields from attributes of the same names; ``other`` has the rest."""
         if not other:
             return cls.model_validate(source)
         named = {
@@ -52,9 +91,35 @@ class Model(BaseModel):
 
 
 class Body(BaseModel):
-    """Base of what a request brings: each value of its own kind, and nothing else."""
+    """Base of request bodies: strict types, and no unknown members."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
+
+
+AModel = TypeVar("AModel", bound=BaseModel)
+
+
+def with_fields(
+    fields: Mapping[str, Any],
+) -> Callable[[type[AModel]], type[AModel]]:
+    """Decorate a model with the fields of a table, each a type and a ``Field``."""
+
+    def give(model: type[AModel]) -> type[AModel]:
+        return create_model(
+            model.__name__,
+            __base__=model,
+            __doc__=model.__doc__,
+            __module__=model.__module__,
+            **fields,
+        )
+
+    return give
+
+
+def members_of(kind: type, *names: str) -> Callable[[type[AModel]], type[AModel]]:
+    """Decorate a model with members of a domain value, under their types there."""
+    hints = get_type_hints(kind)
+    return with_fields({name: (hints[name], ...) for name in names})
 
 
 M = TypeVar("M", bound=Model)
@@ -74,6 +139,7 @@ def write_json(value: object) -> bytes:
 
 def _plain(value: object) -> object:
     if isinstance(value, Model):
+        # Pydantic's own writer applies the aliases, which orjson does not know.
         return orjson.Fragment(value.model_dump_json())
     raise TypeError(type(value).__name__)
 
@@ -102,17 +168,18 @@ def _whole_or_none(value: object, read: Callable[[object], object]) -> object:
 
 
 Stamp = Annotated[str, BeforeValidator(_stamped)]
-"""A moment, of an instant or of Unix seconds."""
+"""A moment; accepts an instant, Unix seconds, or text that is a stamp already."""
 Tenth = Annotated[float, AfterValidator(partial(round, ndigits=1))]
 Hundredth = Annotated[float, AfterValidator(partial(round, ndigits=2))]
 Thousandth = Annotated[float, AfterValidator(partial(round, ndigits=3))]
 OR_NONE: Final = WrapValidator(_whole_or_none)
-"""A value that is not whole, as of a damaged row, reads as None."""
+"""A value that cannot be read, as of a damaged row, is None."""
 
 
 class Row(Model):
     """A row of the history, with a key for each column of its record (``row_of``)."""
 
+    # Columns are added at run time, where a type checker does not see them.
     if TYPE_CHECKING:
 
         def __getattr__(self, key: str) -> Any:
@@ -120,7 +187,7 @@ class Row(Model):
 
     @classmethod
     def from_record(cls, record: Any) -> Self:
-        """As it was kept."""
+        """A row as the history kept it."""
         return cls.from_value(record)
 
 
@@ -128,7 +195,7 @@ RowModel = TypeVar("RowModel", bound=Row)
 
 
 def row_of(kind: type, *without: str) -> Callable[[type[RowModel]], type[RowModel]]:
-    """Give a model the columns of a record that it does not declare itself.
+    """Decorate a model with the columns of a record that it does not declare itself.
 
     Args:
         kind: The record.
@@ -137,22 +204,17 @@ def row_of(kind: type, *without: str) -> Callable[[type[RowModel]], type[RowMode
 
     def give(model: type[RowModel]) -> type[RowModel]:
         keys: dict[str, Any] = {
-            _key(one): (_type(one), _field(one))
-            for one in SHOWN_COLUMNS[kind]
-            if _key(one) not in (*model.model_fields, *without)
+            _key(column): (_type(column), _field(column))
+            for column in SHOWN_COLUMNS[kind]
+            if _key(column) not in (*model.model_fields, *without)
         }
-        return create_model(
-            model.__name__,
-            __base__=model,
-            __doc__=model.__doc__,
-            __module__=model.__module__,
-            **keys,
-        )
+        return with_fields(keys)(model)
 
     return give
 
 
 def _key(column: Column) -> str:
+    # Columns of one transport share their key; only the name tells them apart.
     return column.key if column.transport is None else column.name
 
 
@@ -187,6 +249,7 @@ class Position(Model):
     z: float
 
 
+@members_of(Rectangle, "xmin", "ymin", "xmax", "ymax")
 class Area(Model):
     """A rectangle along the axes of ``map`` (m).
 
@@ -196,11 +259,6 @@ class Area(Model):
         xmax: Sides (m).
         ymax: Sides (m).
     """
-
-    xmin: float
-    ymin: float
-    xmax: float
-    ymax: float
 
 
 class Lane(Area):
@@ -223,6 +281,7 @@ class Obstacle(Area):
     kind: str
 
 
+@members_of(StructuralPost, "x", "y", "radius")
 class Post(Model):
     """A round thing (m).
 
@@ -231,10 +290,6 @@ class Post(Model):
         y: Centre (m).
         radius: Radius (m).
     """
-
-    x: float
-    y: float
-    radius: float
 
 
 class GreenhouseMap(Model):
@@ -257,11 +312,14 @@ class GreenhouseMap(Model):
     obstacles: list[Obstacle]
 
     @classmethod
-    def of(cls, greenhouse: Greenhouse) -> Self:
+    def from_greenhouse(cls, greenhouse: Greenhouse) -> Self:
         """The greenhouse that is supervised."""
-        lanes = [Lane.from_value(one.area, label=one.label) for one in greenhouse.lanes]
+        lanes = [
+            Lane.from_value(lane.area, label=lane.label) for lane in greenhouse.lanes
+        ]
         obstacles = [
-            Obstacle.from_value(one.area, kind=one.kind) for one in greenhouse.obstacles
+            Obstacle.from_value(obstacle.area, kind=obstacle.kind)
+            for obstacle in greenhouse.obstacles
         ]
         return cls.from_value(greenhouse, lanes=lanes, obstacles=obstacles)
 
@@ -285,24 +343,24 @@ class Scan(Model):
 class Costmap(Model):
     """Cells from the south-western corner, row by row: 0-100, -1 unknown.
 
-    All robots' scans, with the zones of people and moving peers laid over; or what one
-    robot believes: its own scans, and the people and peers of whom feedback told it.
+    All robots' scans, with the zones of people and moving peers laid over; or one
+    robot's own scans, with the people and peers of its feedback.
 
     Attributes:
+        resolution: Metres a cell.
         width: ``width`` is 0 before the first scan (cells).
         height: ``width`` is 0 before the first scan (cells).
         origin: South-western corner (m).
         data: Rows from the south-western corner: 0 free … 100 taken, −1 unknown.
+        age_s: Since the newest scan in it; null before the first.
     """
 
-    resolution: float = Field(description="Metres a cell.")
+    resolution: float
     width: int
     height: int
     origin: Point
     data: list[int]
-    age_s: float | None = Field(
-        default=None, description="Since the newest scan in it; null before the first."
-    )
+    age_s: float | None = None
 
 
 class LaneCoverage(Area):
@@ -312,39 +370,37 @@ class LaneCoverage(Area):
         label: The aisle.
         columns: Its size (cells).
         rows: Its size (cells).
+        ages_s: Whole seconds since a camera last covered a cell; null: never.
     """
 
     label: str
     columns: int
     rows: int
-    ages_s: list[int | None] = Field(
-        description="Whole seconds since a camera last covered a cell; null: never."
-    )
+    ages_s: list[int | None]
 
 
 class Coverage(Model):
-    """When a camera last looked at each cell of the aisles.
+    """Time of the last view of each cell of the aisles.
 
-    A camera looks where it would take a zone away: LIVE, within three quarters of its
-    reach, nothing in between.
+    In view is a place where the camera could end a zone: LIVE, within three quarters of
+    its reach, nothing in between.
 
     Attributes:
         at: When.
+        cameras: Number of working cameras.
         within_s: 10 (s).
+        share: Share of the cells covered within that time (0-1); null without aisles.
         lanes: One for each aisle.
     """
 
     at: str
-    cameras: int = Field(description="Number of working cameras.")
+    cameras: int
     within_s: float
-    share: float | None = Field(
-        description=(
-            "Share of the cells covered within that time (0-1); null without aisles."
-        )
-    )
+    share: float | None
     lanes: list[LaneCoverage]
 
 
+@members_of(Pose2D, "x", "y", "yaw")
 class Pose(Model):
     """Pose of ``base_link`` in ``map``.
 
@@ -353,10 +409,6 @@ class Pose(Model):
         y: Position (m).
         yaw: Heading (rad).
     """
-
-    x: float
-    y: float
-    yaw: float
 
 
 class Twist(Model):
@@ -371,6 +423,6 @@ class Twist(Model):
     angular: float
 
     @classmethod
-    def of(cls, twist: Twist2D) -> Self:
+    def from_twist(cls, twist: Twist2D) -> Self:
         """As the robot measured it."""
         return cls(linear=twist.linear_x, angular=twist.angular_z)

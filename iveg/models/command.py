@@ -1,10 +1,8 @@
-"""STOP, release and resume as people follow them, live and remembered."""
+"""STOP, release and resume, live and from the history."""
 
 from collections.abc import Sequence
 from math import isfinite
 from typing import Annotated, Any, Self
-
-from pydantic import Field
 
 from iveg.domain import stop
 from iveg.domain.goals import GoalKind
@@ -22,6 +20,7 @@ from iveg.models.base import (
     Slots,
     Stamp,
     Thousandth,
+    members_of,
     row_of,
 )
 
@@ -33,23 +32,20 @@ class CommandTimes(Model):
     the order left for that transport, not when that took it.
 
     Attributes:
+        pressed: By the browser's corrected clock; null where no page sent it, or where
+            it is impossible.
         requested: Accepted by the server.
+        sent: By transport, when the order left; a transport that has not taken it has
+            no key.
+        answer: By transport, when the robot said by it that it has it.
+        standing: The first standing sample.
     """
 
-    pressed: Stamp | None = Field(
-        description=(
-            "By the browser's corrected clock; null where no page told, or it cannot "
-            "be."
-        )
-    )
+    pressed: Stamp | None
     requested: Stamp
-    sent: dict[TransportId, Stamp] = Field(
-        description="By transport, when it took it; one that has not is not there."
-    )
-    answer: dict[TransportId, Stamp] = Field(
-        description="By transport, when the robot said by it that it has it."
-    )
-    standing: Stamp | None = Field(description="The first standing sample.")
+    sent: dict[TransportId, Stamp]
+    answer: dict[TransportId, Stamp]
+    standing: Stamp | None
 
 
 class CommandRobot(Model):
@@ -66,6 +62,7 @@ class CommandRobot(Model):
     moved_m: Hundredth
 
 
+@members_of(CommandEventRecord, "state", "why")
 class CommandStep(Model):
     """One line of the audit trail of a command.
 
@@ -76,8 +73,6 @@ class CommandStep(Model):
     """
 
     at: Stamp
-    state: str
-    why: str
 
 
 class Sentence(Model):
@@ -112,7 +107,7 @@ class CommandGoal(Model):
 class Command(Row):
     """One STOP, release, resume or goal.
 
-    What only a command that goes on has is null, empty or false in the history.
+    Members of an open command alone are null, empty or false in the history.
 
     A STOP ends as ``RUNNING``. ``REPLACED``: another command took over. ``EXPIRED``:
     the robot never confirmed a release or resume, or a crash of the server left the
@@ -125,7 +120,7 @@ class Command(Row):
 
     A transport is ``ok`` when the robot's answer has come back on it, and ``direct`` of
     a STOP when the broker has it (PUBACK). It is ``pending`` when the order was handed
-    over and nothing more is known: Orion's 204 is no evidence. It is ``unknown`` when
+    over without an answer: Orion's 204 is no evidence. It is ``unknown`` when
     Orion took the order while the agent or the broker is known to be cut off;
     ``failed`` when the order was not taken; ``off`` by ``IVEG_STOP_DIRECT``. The keys
     are the ids of ``iveg/domain/transports.py``; another transport is one more key.
@@ -133,7 +128,8 @@ class Command(Row):
     Attributes:
         times: When each step came to be known; each has a key of its own, too, named as
             in the CSV.
-        requesters: All who pressed.
+        standstill_ms: First standing sample less the press; null while unknown (ms).
+        requesters: All people who pressed.
         hold_id: What a STOP is called at the robot: its own ``command_id`` unless it
             keeps an earlier hold; null for others.
         age_s: Since it was requested (s).
@@ -141,48 +137,39 @@ class Command(Row):
             ``unknown``, see above.
         robot: The robot's last word while it is open.
         challenge_fresh: A release may be composed now.
+        outcome: How it ended; null on ``/live``, where ``state`` says how it stands.
         was_loud: It was UNCONFIRMED or STILL_MOVING at any time.
+        goal: Of a goal; on ``/live`` goals are the robot's.
+        steps: Steps of the audit trail; empty on ``/live``, which reports each step
+            itself.
     """
 
     times: CommandTimes
-    standstill_ms: Thousandth | None = Field(
-        description="First standing sample less the press; null while unknown (ms)."
-    )
+    standstill_ms: Thousandth | None
     requesters: list[str]
     hold_id: str | None = None
     age_s: Thousandth | None = None
     transports: dict[str, str]
     robot: CommandRobot | None = None
     challenge_fresh: bool = False
-    outcome: Outcome | None = Field(
-        default=None,
-        description=(
-            "How it ended; null on ``/live``, where ``state`` says how it stands."
-        ),
-    )
+    outcome: Outcome | None = None
     was_loud: bool = False
-    goal: Annotated[CommandGoal | None, OR_NONE] = Field(
-        default=None, description="Of a goal; on ``/live`` goals are the robot's."
-    )
-    steps: list[CommandStep] = Field(
-        description=(
-            "Steps of the audit trail; empty on ``/live``, which reports each step "
-            "itself."
-        )
-    )
+    goal: Annotated[CommandGoal | None, OR_NONE] = None
+    steps: list[CommandStep]
 
     @classmethod
-    def of(
-        cls, followed: stop.FollowedCommand, machine: StopMachine, now: Instant
+    def from_command(
+        cls, command: stop.FollowedCommand, machine: StopMachine, now: Instant
     ) -> Self:
-        """One command with the robot's last word."""
+        """A command of this run, with the robot's newest report."""
         return cls._from_row(
-            write_command(followed),
-            requesters=list(followed.requesters),
-            hold_id=followed.hold_id,
-            age_s=now.mono - followed.times.requested.mono,
-            transports=dict(followed.transports),
+            write_command(command),
+            requesters=list(command.requesters),
+            hold_id=command.hold_id,
+            age_s=now.mono - command.times.requested.mono,
+            transports=dict(command.transports),
             robot=_robot(machine, now),
+            # A release lifts the holds that a person sees: their report must be fresh.
             challenge_fresh=machine.evidence.report_age(now) <= LIMITS.report_fresh_s,
             steps=[],
         )
@@ -191,13 +178,13 @@ class Command(Row):
     def from_record(
         cls, record: CommandRecord, steps: Sequence[CommandEventRecord] = ()
     ) -> Self:
-        """One command as it is remembered, with each of its steps."""
+        """A command of the history, with each of its steps."""
         return cls._from_row(
             record,
             requesters=[record.requested_by],
             transports={},
             outcome=outcome_of(record),
-            was_loud=was_loud((record.state, *(one.state for one in steps))),
+            was_loud=was_loud((record.state, *(step.state for step in steps))),
             steps=steps,
         )
 
@@ -210,15 +197,19 @@ class Command(Row):
             "answer": record.answer_at,
             "standing": record.standing_at,
         }
-        columns = SHOWN_COLUMNS[CommandRecord]
-        apart = {one.name: one.read(record) for one in columns if one.transport}
-        return cls.from_value(record, times=times, **apart, **other)
+        by_transport = {
+            column.name: column.read(record)
+            for column in SHOWN_COLUMNS[CommandRecord]
+            if column.transport
+        }
+        return cls.from_value(record, times=times, **by_transport, **other)
 
 
 def _robot(machine: StopMachine, now: Instant) -> CommandRobot:
     report, age = machine.evidence.report, machine.evidence.evidence_age(now)
     return CommandRobot(
         v=0.0 if report is None else report.linear,
+        # JSON has no infinity, which is the age before the first report.
         report_age_s=age if isfinite(age) else None,
         moved_m=machine.evidence.moved_m(now),
     )
@@ -228,9 +219,9 @@ class Pressed(Model):
     """A STOP, release or resume that was accepted.
 
     Attributes:
-        robot_id: What was asked of whom.
-        command_id: What was asked of whom.
-        state: ``REQUESTED``, or how it stands.
+        robot_id: Robot that the order is for.
+        command_id: Id of the order.
+        state: ``REQUESTED``, or its present state.
     """
 
     robot_id: str

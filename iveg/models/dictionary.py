@@ -28,10 +28,10 @@ def describe() -> str:
     page = _HEAD
     for name, kind in LISTS.items():
         page += _TABLE.format(name)
-        for one in SHOWN_COLUMNS[kind]:
-            said = one.meaning
-            cells = one.type, said.unit, said.frame, said.clock, said.means, said.joins
-            page += f"| `{one.name}` | {' | '.join(cells)} |\n"
+        for column in SHOWN_COLUMNS[kind]:
+            row = column.meaning
+            cells = column.type, row.unit, row.frame, row.clock, row.means, row.joins
+            page += f"| `{column.name}` | {' | '.join(cells)} |\n"
     return page
 
 

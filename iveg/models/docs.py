@@ -1,20 +1,14 @@
-"""The page of resources, from the models: ``python -m iveg.models.docs`` prints it.
+"""The page of resources, from the models: ``python -m iveg.models.docs`` prints it."""
 
-The meaning of a key stands under "Attributes" in the docstring of its model, or in the
-description of its field.
-"""
-
-import inspect
-import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import groupby
 from typing import Final
 
 from pydantic.json_schema import models_json_schema
 
 from iveg.domain.records import Json
-from iveg.models.base import Model
+from iveg.models.base import Model, in_line
 from iveg.models.health import Recording
 from iveg.models.history import (
     AcknowledgedAlerts,
@@ -24,10 +18,10 @@ from iveg.models.history import (
     OdometryRow,
 )
 from iveg.models.people import DetectionRow
-from iveg.models.typescript import TOLD
+from iveg.models.typescript import PAGE_MODELS
 
 SHOWN: Final[tuple[type[Model], ...]] = (
-    *TOLD,
+    *PAGE_MODELS,
     AcknowledgedAlerts,
     Day,
     DetectionRow,
@@ -42,7 +36,7 @@ _HEAD: Final = """\
 This page is generated: `python -m iveg.models.docs > docs/interfaces/resources.md`.
 
 Each resource has one shape, on `/live`, in REST, lists, history and exports alike.
-What only a command or detection of this moment has is null, empty or false in the
+Members of an open command or present detection alone are null, empty or false in the
 history. `/openapi.json` is made of the same models.
 
 **Types** are those of JSON. An object of numbers has numbers as values, under keys that
@@ -58,67 +52,41 @@ formatted by the reader's locale.
 """
 _FEW: Final = 3
 """A value of more kinds than that may be any scalar."""
-_ROW: Final = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.M)
 
 
 def write_page() -> str:
     """The whole page."""
-    _, document = models_json_schema([(one, "serialization") for one in SHOWN])
+    _, document = models_json_schema([(model, "serialization") for model in SHOWN])
     shapes = document["$defs"]
-    models = {one.__name__: one for one in _models(Model)}
     sections = (
-        _section(models[name], schema, shapes)
+        _section(name, schema, shapes)
         for name, schema in sorted(shapes.items())
         if "properties" in schema
     )
     return "\n".join([_HEAD, *sections])
 
 
-def _models(base: type[Model]) -> Iterator[type[Model]]:
-    for one in base.__subclasses__():
-        yield one
-        yield from _models(one)
-
-
-def _section(model: type[Model], schema: Json, shapes: Json) -> str:
-    text, _, _ = (inspect.getdoc(model) or "").partition("\n\nAttributes:")
-    told = "\n\n".join(_line(one) for one in text.split("\n\n"))
+def _section(name: str, schema: Json, shapes: Json) -> str:
+    text = "\n\n".join(in_line(part) for part in schema["description"].split("\n\n"))
     rows = [
         f"| {', '.join(names)} | {kind} | {meaning} |\n"
-        for names, kind, meaning in _rows(model, schema, shapes)
+        for names, kind, meaning in _rows(schema, shapes)
     ]
     head = "| key | type | meaning |\n|---|---|---|\n"
-    return f"## {model.__name__}\n\n{told}\n\n{head}{''.join(rows)}"
+    return f"## {name}\n\n{text}\n\n{head}{''.join(rows)}"
 
 
-def _rows(
-    model: type[Model], schema: Json, shapes: Json
-) -> Iterator[tuple[list[str], str, str]]:
-    """Keys that stand together and mean the same are one row."""
-    meanings = _meanings(model)
-    found = [
-        (f"`{key}`", type_of(one, shapes), one.get("description") or meanings.get(key))
-        for key, one in schema["properties"].items()
+def _rows(schema: Json, shapes: Json) -> Iterator[tuple[list[str], str, str]]:
+    """Rows of the table; neighbours of one type and meaning share a row."""
+    members = [
+        (f"`{key}`", type_of(member, shapes), member.get("description", ""))
+        for key, member in schema["properties"].items()
     ]
-    for (kind, meaning), rows in groupby(found, lambda row: row[1:]):
+    for (kind, meaning), rows in groupby(members, lambda row: row[1:]):
         keys = [row[0] for row in rows]
+        # Without a meaning nothing says that neighbours mean the same.
         for names in [keys] if meaning else [[key] for key in keys]:
-            yield names, kind, _line(meaning or "–")
-
-
-def _meanings(model: type[Model]) -> Mapping[str, str]:
-    """Meanings by key, as the docstrings of the model and its bases tell them."""
-    told: dict[str, str] = {}
-    for one in reversed(model.__mro__):
-        _, _, rows = (inspect.cleandoc(one.__doc__ or "")).partition("Attributes:")
-        told |= dict(_ROW.findall(rows))
-    fields = model.model_fields.items()
-    names = {key: one.serialization_alias or key for key, one in fields}
-    return {names.get(key, key): text for key, text in told.items()}
-
-
-def _line(text: str) -> str:
-    return " ".join(text.replace("``", "`").split())
+            yield names, kind, meaning or "–"
 
 
 def type_of(schema: Json, shapes: Json) -> str:

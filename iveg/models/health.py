@@ -1,12 +1,10 @@
 """Health of the data path, latency hop by hop, and recordings."""
 
-from typing import Literal, Self
-
-from pydantic import Field
+from typing import Literal
 
 from iveg.domain.latency import Data
 from iveg.domain.recordings import RecordingFile
-from iveg.models.base import Hundredth, Model, Stamp, Tenth
+from iveg.models.base import Hundredth, Model, Stamp, Tenth, members_of
 
 
 def in_ms(seconds: float | None) -> float | None:
@@ -23,6 +21,7 @@ class HopHealth(Model):
         age_s: Of the evidence (s).
         key: Its sentence.
         detail: What else is known.
+        lag_s: How late measures pass it, at least.
     """
 
     hop: str
@@ -30,7 +29,7 @@ class HopHealth(Model):
     age_s: Tenth | None
     key: str
     detail: str
-    lag_s: Tenth | None = Field(description="How late measures pass it, at least.")
+    lag_s: Tenth | None
 
 
 class Health(Model):
@@ -40,14 +39,13 @@ class Health(Model):
         ok: Every hop is.
         hops: One for each hop.
         counters: Events by name.
+        earlier: State of the records of earlier runs.
     """
 
     ok: bool
     hops: list[HopHealth]
     counters: dict[str, int]
-    earlier: Literal["known", "reading", "unknown"] = Field(
-        description="State of the records of earlier runs."
-    )
+    earlier: Literal["known", "reading", "unknown"]
 
 
 class SegmentSpread(Model):
@@ -101,44 +99,35 @@ class LatencyTable(Model):
 
     Attributes:
         at: When.
+        robot: Null: all robots.
+        direct: Whether iVeg reads the broker itself, so that Δt₁ and Δt₂ are two
+            numbers.
         rows: One for each kind of data.
+        paper: The paper's printed numbers, by place, kind of data and column (ms).
         clocks: One for each robot.
+        figures: ``cdf`` as Plotly draws it; empty if unwanted.
     """
 
     at: str
-    robot: str | None = Field(description="Null: all robots.")
-    direct: bool = Field(
-        description=(
-            "Whether iVeg reads the broker itself, so that Δt₁ and Δt₂ are two numbers."
-        )
-    )
+    robot: str | None
+    direct: bool
     rows: list[LatencyRow]
-    paper: dict[str, dict[str, dict[str, float]]] = Field(
-        description=(
-            "The paper's printed numbers, by place, kind of data and column (ms)."
-        )
-    )
+    paper: dict[str, dict[str, dict[str, float]]]
     clocks: list[LatencyClock]
-    figures: dict[str, object] = Field(
-        description="``cdf`` as Plotly draws it; empty if unwanted."
-    )
+    figures: dict[str, object]
 
 
+@members_of(RecordingFile, "name", "size", "is_open")
 class Recording(Model):
     """One file of about an hour.
 
     A file of about an hour of what came in ([recordings.md](recordings.md)).
 
     Attributes:
+        name: Begins with its first moment (UTC).
+        size: Bytes.
+        is_open: Still written; it cannot be fetched yet.
         changed_at: When it was written last.
     """
 
-    name: str = Field(description="Begins with its first moment (UTC).")
-    size: int = Field(description="Bytes.")
-    is_open: bool = Field(description="Still written; it cannot be fetched yet.")
     changed_at: Stamp
-
-    @classmethod
-    def of(cls, file: RecordingFile) -> Self:
-        """As it lies on the disk."""
-        return cls.from_value(file, changed_at=file.changed)

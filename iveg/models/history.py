@@ -1,10 +1,10 @@
-"""The past: rows of the history as REST, NDJSON and pages have them, and one day."""
+"""Rows of the history as REST, NDJSON and pages have them, and one day."""
 
-import json
-from typing import Literal, Self
+from typing import Self
 
-from pydantic import Field, JsonValue
+from pydantic import Json, JsonValue
 
+from iveg.domain import day
 from iveg.domain.alerts import BookedAlert, write_alert
 from iveg.domain.records import (
     AlertRecord,
@@ -23,6 +23,7 @@ from iveg.models.base import (
     Slots,
     Stamp,
     Tenth,
+    members_of,
     row_of,
 )
 from iveg.models.command import Command, Sentence
@@ -34,14 +35,17 @@ class Alert(Row):
 
     A notice to people (ISA-18.2). One condition (kind and subject) that is back within
     10 minutes is the same alert, once more; each time it sounds and asks to be
-    acknowledged anew. A condition that gets graver is raised anew at once. When it was
-    over, and what somebody did about it, is of the newest time.
+    acknowledged anew. A condition that gets graver is raised anew at once. Its end and
+    acknowledgement are those of the newest time.
+
+    Attributes:
+        slots: Values of its sentence.
     """
 
-    slots: Slots = Field(description="Values of its sentence.")
+    slots: Slots
 
     @classmethod
-    def of(cls, alert: BookedAlert) -> Self:
+    def from_alert(cls, alert: BookedAlert) -> Self:
         """One alert as it is now."""
         return cls.from_value(write_alert(alert))
 
@@ -50,22 +54,26 @@ class AcknowledgedAlerts(Model):
     """Outcome of alerts that somebody acknowledged together.
 
     Attributes:
-        items: Those that this acknowledged.
+        items: Alerts that this acknowledged.
+        left: Other ids: P1s, acknowledged and unknown alerts.
     """
 
     items: list[Alert]
-    left: list[str] = Field(
-        description="Ids that were left: P1s, seen ones, and what is no longer there."
-    )
+    left: list[str]
 
 
 @row_of(LogRecord)
 class LogEntry(Row):
-    """One line of the action and inference log."""
+    """One line of the action and inference log.
 
-    slots: Slots = Field(description="Values of its sentence.")
+    Attributes:
+        slots: Values of its sentence.
+    """
+
+    slots: Slots
 
 
+@members_of(LogRecord, "robot_id", "decision_id")
 class Note(Model):
     """Somebody's words about a moment; nobody can change them.
 
@@ -88,8 +96,6 @@ class Note(Model):
     text: str
     x: float | None
     y: float | None
-    robot_id: str | None
-    decision_id: str | None
 
     @classmethod
     def from_record(cls, line: LogRecord) -> Self:
@@ -109,19 +115,14 @@ class Note(Model):
 
 @row_of(AuditRecord)
 class AuditEntry(Row):
-    """One row of the audit."""
+    """One row of the audit.
 
-    details: dict[str, JsonValue] = Field(
-        description=(
-            "``status`` of the answer, and what was asked; of a rule the new "
-            "``version``."
-        )
-    )
+    Attributes:
+        details: ``status`` of the answer, and the request; of a rule the new
+            ``version``.
+    """
 
-    @classmethod
-    def from_record(cls, record: AuditRecord) -> Self:
-        """As it was kept."""
-        return cls.from_value(record, details=json.loads(record.details))
+    details: Json[dict[str, JsonValue]]
 
 
 @row_of(OdometryRecord)
@@ -136,7 +137,7 @@ class Reading(Row):
 
 @row_of(MeasurementRecord)
 class Measurement(Row):
-    """One number of other equipment, as it was kept."""
+    """One stored number of other equipment."""
 
 
 # --- decisions ------------------------------------------------------------------------
@@ -153,7 +154,7 @@ class DecisionLink(Model):
         link: Its name; a last link ``interrupted`` says that iVeg was interrupted, with
             the time when that was found.
         at: When.
-        value: What was measured.
+        value: Measured value.
         verdict: ``ok``, ``late``, ``missing``, ``n/a``, ``open`` or ``unknown``, see
             above.
     """
@@ -188,8 +189,9 @@ class Decision(Row):
 
 def sentence_of(record: DecisionRecord) -> Sentence:
     """Sentence that the log used when it happened."""
-    is_walker = record.reason == "person" and record.confidence is None
-    reason = "walker" if is_walker else record.reason or "default"
+    # Only a laser track is a person without the confidence of a detector.
+    is_laser_track = record.reason == "person" and record.confidence is None
+    reason = "walker" if is_laser_track else record.reason or "default"
     if record.kind == "alert":
         key = "log.person_seen"
     elif record.in_sight is False:
@@ -228,13 +230,19 @@ class Worked(Model):
 
 
 class Slowed(Model):
-    """Minutes of robots slowed, by what slowed them and the aisle that it was in."""
+    """Minutes of robots slowed, by what slowed them and the aisle that it was in.
 
-    cause: str = Field(description="``person`` or ``robot``.")
-    lane: str | None = Field(description="Null: outside the aisles, or unknown.")
+    Attributes:
+        cause: ``person`` or ``robot``.
+        lane: Null: outside the aisles, or unknown.
+    """
+
+    cause: str
+    lane: str | None
     minutes: Tenth
 
 
+@members_of(day.EncounterCounts, "count", "slowed")
 class Encounters(Model):
     """Number of times that robots came to the zone of a person on that day.
 
@@ -242,27 +250,25 @@ class Encounters(Model):
 
     Attributes:
         count: Encounters.
+        slowed: Encounters in which the robot reported that it was slow.
     """
 
-    count: int
-    slowed: int = Field(description="Of which the robot said that it was slow.")
 
-
+@members_of(day.Passing, "robot_id", "lane")
 class Pass(Model):
     """A moving robot near a person, by means over a second.
 
     Attributes:
         at: When.
         robot_id: Who.
+        distance_m: Between the middles of both.
         speed: Of the robot (m/s).
         lane: Aisle.
     """
 
     at: Stamp
-    robot_id: str
-    distance_m: Hundredth = Field(description="Between the middles of both.")
+    distance_m: Hundredth
     speed: Hundredth
-    lane: str | None
 
 
 class Day(Model):
@@ -271,30 +277,27 @@ class Day(Model):
     Poses are means over a second.
 
     Attributes:
+        day: ISO date.
         since: Its range; ``until`` is now while it goes on.
+        until: The end of the day, or the moment of asking while it goes on.
         robots: Who took part.
         worked: Minutes in each aisle.
         slowed: Minutes of limited speed.
-        encounters: How often a robot came to the zone of a person.
+        encounters: Times that a robot came to the zone of a person.
+        passes: The nearest, nearest first.
+        stops: STOPs, oldest first.
+        unseen: P1s that nobody has acknowledged.
         map: The greenhouse.
     """
 
-    day: str = Field(description="ISO date.")
+    day: str
     since: Stamp
-    until: Stamp = Field(
-        description="The end of the day, or the moment of asking while it goes on."
-    )
+    until: Stamp
     robots: list[str]
     worked: list[Worked]
     slowed: list[Slowed]
     encounters: Encounters
-    passes: list[Pass] = Field(description="The nearest, nearest first.")
-    stops: list[Command] = Field(description="STOPs, oldest first.")
-    unseen: int = Field(description="P1s that nobody has acknowledged.")
-    lost: list[Literal["places", "telemetry"]] = Field(
-        description=(
-            "What of the day is no longer kept: places of people (no passes, no aisles "
-            "of causes) or odometry and detections (nothing worked, no passes)."
-        )
-    )
+    passes: list[Pass]
+    stops: list[Command]
+    unseen: int
     map: GreenhouseMap

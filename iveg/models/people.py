@@ -1,15 +1,17 @@
-"""People, marks of operators, and detections, live and remembered."""
+"""People, marks of operators, and detections, live and from the history."""
 
 from typing import Annotated, Literal, Self
 
 from pydantic import Field
 
+from iveg.domain.geometry import Box3D
 from iveg.domain.parameters import Class
 from iveg.domain.records import DetectionRecord
-from iveg.domain.tracking import person
+from iveg.domain.rule.zones import ZoneEntry
+from iveg.domain.tracking import things
 from iveg.domain.tracking.looks import Looks
 from iveg.domain.tracking.people import Placed
-from iveg.domain.tracking.person import Stage
+from iveg.domain.tracking.tracker import Stage
 from iveg.domain.transports import TransportId
 from iveg.models.base import (
     OR_NONE,
@@ -18,10 +20,12 @@ from iveg.models.base import (
     Row,
     Stamp,
     Thousandth,
+    members_of,
     row_of,
 )
 
 
+@members_of(ZoneEntry, "robot_id", "in_sight")
 class Acting(Model):
     """A robot that is slowed for somebody.
 
@@ -31,31 +35,29 @@ class Acting(Model):
         in_sight: Whether the robot could see them itself.
     """
 
-    robot_id: str
     distance_m: Thousandth
-    in_sight: bool
 
 
+@members_of(Looks, "least", "most", "over_s")
 class Evidence(Model):
-    """All looks at somebody, and what they come to.
+    """All looks at a person, and their sum.
 
-    All looks at somebody, by every robot, and what they come to
+    All looks at a person, by every robot, and their sum
     ([safety.md](../safety.md), "The rule").
 
     Attributes:
         looks: Number of looks; 0.3 s of pictures of a robot are one.
-        most: Confidence of the faintest and the surest (0–1).
+        least: Confidence of the faintest look (0 to 1).
+        most: Confidence of the surest look (0 to 1).
+        over_s: From the first look to the newest (s).
         probability: That it is a person (0–1).
     """
 
     looks: int
-    least: float = Field(description="Confidence of the faintest look (0 to 1).")
-    most: float
-    over_s: float = Field(description="From the first look to the newest.")
     probability: float
 
     @classmethod
-    def of(cls, looks: Looks | None) -> Self | None:
+    def from_looks(cls, looks: Looks | None) -> Self | None:
         """Evidence of these looks; None where nothing adds up."""
         if looks is None:
             return None
@@ -74,71 +76,72 @@ class Person(Model):
             each day (UTC), and a suffix that is new each day and at each start of iVeg,
             so that no id comes twice.
         class_: Canonical class.
-        stage: ``seen`` ≤ 1 s, ``remembered`` ≤ 10 s, ``last_seen`` ≤ 10 min, or 1 min,
-            and no longer than until the place was seen to be empty, of somebody who was
-            never seen for 2.5 s at a time.
+        class_id: The detector's own class name.
+        stage: ``seen`` ≤ 1 s, ``remembered`` ≤ 10 s, ``last_seen`` ≤ 10 min. Somebody
+            who was never seen for 2.5 s at a time is ``last_seen`` for 1 min at most,
+            and only until the place was seen to be empty.
         position: In ``map`` (m).
-        confidence: Of the newest detection; 0.5 of whom only a laser saw (0–1).
+        radius_m: Radius of the widest zone.
+        confidence: Of the newest detection; 0.5 where only a laser saw it (0–1).
         first_seen: First and newest detection.
         last_seen: First and newest detection.
         age_s: Since the newest detection (s).
         observers: Robots that saw it.
+        possible: Below the threshold but seen again and again.
+        evidence: All looks by the newest detection; None of a robot.
+        doubtful: Seen beyond the walls: the position is its observer's.
+        decision_id: Newest open decision about this person.
         lane: Aisle in which it is.
         acting: Robots that are slowed for it.
+        thing_id: The mark by which it is no person and has no zone.
     """
 
     person_id: str
     class_: Class = Field(validation_alias="class", serialization_alias="class")
-    class_id: str = Field(description="The detector's own class name.")
+    class_id: str
     stage: Stage
     position: Position
-    radius_m: float | None = Field(description="Radius of the widest zone.")
+    radius_m: float | None
     confidence: float
     first_seen: Stamp
     last_seen: Stamp
     age_s: Thousandth
     observers: list[str]
-    possible: bool = Field(description="Below the threshold but seen again and again.")
-    evidence: Evidence | None = Field(
-        description="All looks by the newest detection; None of a robot."
-    )
-    doubtful: bool = Field(
-        description="Seen beyond the walls: the position is its observer's."
-    )
-    decision_id: str | None = Field(
-        description="Newest open decision about this person."
-    )
+    possible: bool
+    evidence: Evidence | None
+    doubtful: bool
+    decision_id: str | None
     lane: str | None
     acting: list[Acting]
-    thing_id: str | None = Field(
-        description="The mark by which it is no person and has no zone."
-    )
+    thing_id: str | None
 
 
+@members_of(things.Thing, "thing_id", "by")
 class Thing(Model):
-    """One mark: who is born inside its circle and stays there slows nobody.
+    """One mark: a track that begins within its radius and stays there slows nobody.
 
     Attributes:
         thing_id: The mark.
         kind: Always ``person``.
+        x: Its middle in ``map`` (m).
         y: Its middle in ``map`` (m).
         radius_m: 0.5, a constant (m).
         by: Who marked it.
         since: When.
+        until: When it ends at the latest.
     """
 
-    thing_id: str
     kind: Literal["person"] = "person"
-    x: Thousandth = Field(description="Of its middle in ``map``.")
+    x: Thousandth
     y: Thousandth
-    radius_m: float = person.RADIUS_M
-    by: str
+    radius_m: float = things.RADIUS_M
     since: Stamp
-    until: Stamp = Field(description="When it ends at the latest.")
+    until: Stamp
 
 
-class DetectionBox(Model):
-    """A 3D box (m) in ``frame_id``.
+@members_of(Box3D, "xmin", "xmax", "ymin", "ymax", "zmin", "zmax")
+class _Box(Model):
+    """Sides of a box.
 
     Attributes:
         xmin: Sides (m).
@@ -147,15 +150,16 @@ class DetectionBox(Model):
         ymax: Sides (m).
         zmin: Sides (m).
         zmax: Sides (m).
+    """
+
+
+class DetectionBox(_Box):
+    """A 3D box (m) in ``frame_id``.
+
+    Attributes:
         frame_id: ``map`` or ``base_link``.
     """
 
-    xmin: float
-    xmax: float
-    ymin: float
-    ymax: float
-    zmin: float
-    zmax: float
     frame_id: str
 
 
@@ -189,22 +193,24 @@ class Detection(Row):
     peer: str | None
 
     @classmethod
-    def of(
-        cls, one: Placed, robot_id: str, stamp: str | None, transport: TransportId
+    def from_placed(
+        cls, placed: Placed, robot_id: str, stamp: str | None, transport: TransportId
     ) -> Self:
         """One detection of a robot's newest frame."""
-        x, y, z = one.position
-        box = DetectionBox.from_value(one.framed.box, frame_id=one.framed.frame_id)
+        x, y, z = placed.position
+        box = DetectionBox.from_value(
+            placed.framed.box, frame_id=placed.framed.frame_id
+        )
         return cls.from_value(
-            one,
+            placed,
             robot_id=robot_id,
             stamp=stamp,
-            class_id=one.detection.class_id,
-            probability=one.detection.probability,
+            class_id=placed.detection.class_id,
+            probability=placed.detection.probability,
             position=Position(x=x, y=y, z=z),
             box=box,
-            confident=one.kind != "faint",
-            person_id=None if one.person is None else one.person.person_id,
+            confident=placed.kind != "faint",
+            person_id=None if placed.person is None else placed.person.person_id,
             transport=transport,
         )
 

@@ -1,10 +1,9 @@
-"""Everything that is known, for a browser that has just come; air and equipment."""
+"""Everything that is known, for a browser that has just connected."""
 
 from typing import Self
 
-from pydantic import Field
-
-from iveg.domain.equipment import Limit, State, TileStatus
+from iveg.domain.audit import Actor
+from iveg.domain.equipment import State, TileStatus
 from iveg.domain.equipment import Tile as DomainTile
 from iveg.domain.events import Language
 from iveg.domain.observations import Climate as DomainClimate
@@ -16,6 +15,7 @@ from iveg.models.base import (
     Scan,
     Stamp,
     Thousandth,
+    members_of,
 )
 from iveg.models.command import Command
 from iveg.models.health import Health
@@ -25,32 +25,37 @@ from iveg.models.robot import Robot
 from iveg.models.rule import Rule
 
 
+@members_of(DomainClimate, "temperature", "relative_humidity", "co2")
 class Climate(Model):
     """The newest reading of the air; null where a sensor is silent.
 
     Attributes:
+        temperature: °C.
+        relative_humidity: 0 to 1.
+        co2: ppm.
         received_at: When iVeg took it.
         age_s: Since then (s).
     """
 
-    temperature: float | None = Field(description="°C.")
-    relative_humidity: float | None = Field(description="0 to 1.")
-    co2: float | None = Field(description="ppm.")
     received_at: Stamp
     age_s: Thousandth
 
     @classmethod
-    def of(cls, read: DomainClimate, received: Instant, now: Instant) -> Self:
-        """As it came in."""
+    def from_climate(
+        cls, climate: DomainClimate, received: Instant, now: Instant
+    ) -> Self:
+        """The newest reading, with its age at this moment."""
         return cls.from_value(
-            read, received_at=received, age_s=now.mono - received.mono
+            climate, received_at=received, age_s=now.mono - received.mono
         )
 
 
+@members_of(DomainTile, "entity_id", "attribute", "unit", "decimals", "limits")
 class Tile(Model):
     """One attribute of one entity, with its newest number.
 
     Attributes:
+        key: Entity and attribute.
         entity_id: The entity at Orion.
         attribute: Its attribute.
         name: What people call it, by language.
@@ -59,31 +64,27 @@ class Tile(Model):
         limits: ``low_low``, ``low``, ``high``, ``high_high``, those that it has (its
             unit).
         state: [equipment.md](../equipment.md), "States".
+        value: The newest number; null before the first.
         received_at: When iVeg took it.
         age_s: Since then (s).
         trend: Its last 24 hours are drawn.
         place: Of its mark on the map.
     """
 
-    key: str = Field(description="Entity and attribute.")
-    entity_id: str
-    attribute: str
+    key: str
     name: dict[Language, str]
-    unit: str
-    decimals: int
-    limits: dict[Limit, float]
     state: State
-    value: float | None = Field(description="The newest number; null before the first.")
+    value: float | None
     received_at: Stamp | None
     age_s: Thousandth | None
     trend: bool
     place: Point | None
 
     @classmethod
-    def of(
+    def from_tile(
         cls, tile: DomainTile, status: TileStatus, state: State, now: Instant
     ) -> Self:
-        """As it stands now."""
+        """A tile with its newest number, at this moment."""
         received, place = status.received, tile.place
         return cls.from_value(
             tile,
@@ -100,21 +101,21 @@ class Server(Model):
     """Which iVeg speaks.
 
     Attributes:
+        boot: Random, new at each start.
         version: Of iVeg.
         demo: Started by ``iveg demo``.
+        wall: Its clock (Unix s).
     """
 
-    boot: str = Field(description="Random, new at each start.")
+    boot: str
     version: str
     demo: bool
-    wall: float = Field(description="Its clock (Unix s).")
+    wall: float
 
 
+@members_of(Actor, "name", "role")
 class User(Model):
     """The signed-in user."""
-
-    name: str
-    role: str
 
 
 class World(Model):
@@ -126,7 +127,9 @@ class World(Model):
         robots: All robots.
         people: All people.
         detections: By robot id.
+        commands: Those that go on.
         alerts: As the topic.
+        log: The newest 200, oldest first.
         health: As the topic.
         climate: As the topic.
         equipment: As the topic.
@@ -137,9 +140,9 @@ class World(Model):
     robots: list[Robot]
     people: list[Person]
     detections: dict[str, DetectionFrame]
-    commands: list[Command] = Field(description="Those that go on.")
+    commands: list[Command]
     alerts: list[Alert]
-    log: list[LogEntry] = Field(description="The newest 200, oldest first.")
+    log: list[LogEntry]
     health: Health
     climate: Climate | None
     equipment: list[Tile]
@@ -166,14 +169,13 @@ class PastWorld(World):
     pages were told of them then. Ages are of that moment.
 
     Attributes:
+        at: Moment of the picture: the newest that is not after the moment asked for.
+        at_s: The same moment (Unix s).
+        left_out: Topics of the recording that this version does not know.
         scans: Newest of each robot.
     """
 
-    at: str = Field(
-        description="The moment that is shown: the newest by the one asked."
-    )
-    at_s: float = Field(description="The same (Unix s).")
-    left_out: list[str] = Field(
-        description="Topics of the recording that this version does not know."
-    )
+    at: str
+    at_s: float
+    left_out: list[str]
     scans: list[Scan]

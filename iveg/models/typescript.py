@@ -1,4 +1,4 @@
-"""Files that the page has from Python: ``python -m iveg.models.typescript``.
+"""Files of the page that Python writes: ``python -m iveg.models.typescript``.
 
 The output, the types of the models (``static/js/types.d.ts``), the small sensors and
 the order of situations (``static/js/core``), is checked in; a test fails when it is
@@ -25,7 +25,7 @@ from iveg.models.people import Thing
 from iveg.models.rule import Trial
 from iveg.models.snapshot import PastWorld, Snapshot
 
-TOLD: tuple[type[Model], ...] = (
+PAGE_MODELS: tuple[type[Model], ...] = (
     Snapshot,
     PastWorld,
     Scan,
@@ -44,7 +44,7 @@ TOLD: tuple[type[Model], ...] = (
     Thing,
     Trial,
 )
-"""All that a page reads; what they are made of comes with them."""
+"""Models that a page reads; the models of their members come with them."""
 _PLAIN = {
     "string": "string",
     "integer": "number",
@@ -78,7 +78,9 @@ _Schema = Json
 
 def write_types() -> str:
     """The whole file."""
-    _, document = models_json_schema([(one, "serialization") for one in TOLD])
+    _, document = models_json_schema(
+        [(model, "serialization") for model in PAGE_MODELS]
+    )
     schemas = sorted(document["$defs"].items())
     return _HEAD + "".join(_declared(name, schema) for name, schema in schemas)
 
@@ -96,6 +98,7 @@ def _members(schema: _Schema) -> Iterator[str]:
 
 
 def _comment(schema: _Schema, indent: str) -> str:
+    # The first paragraph alone; the whole text is in docs/interfaces/resources.md.
     text = schema.get("description", "").split("\n\n")[0].replace("\n", " ")
     return f"{indent}/** {text} */\n" if text else ""
 
@@ -107,7 +110,8 @@ def _type(schema: _Schema) -> str:
         values = schema.get("enum", [schema.get("const")])
         return " | ".join(f'"{value}"' for value in values)
     if "anyOf" in schema:
-        return " | ".join(dict.fromkeys(_type(one) for one in schema["anyOf"]))
+        # Two Python types, as int and float, may be one of TypeScript: written once.
+        return " | ".join(dict.fromkeys(_type(kind) for kind in schema["anyOf"]))
     if schema.get("type") == "array":
         return _list(schema)
     if schema.get("type") == "object":
@@ -120,8 +124,9 @@ def _type(schema: _Schema) -> str:
 
 def _list(schema: _Schema) -> str:
     if "prefixItems" in schema:
-        return f"[{', '.join(_type(one) for one in schema['prefixItems'])}]"
+        return f"[{', '.join(_type(kind) for kind in schema['prefixItems'])}]"
     inner = _type(schema["items"])
+    # In TypeScript ``A | B[]`` would make a list of B alone.
     return f"({inner})[]" if " | " in inner else f"{inner}[]"
 
 
@@ -139,12 +144,11 @@ def _row(members: Mapping[str, object]) -> str:
 
 
 def _shown(kind: Kind, sensor: Sensor) -> dict[str, object]:
-    flags = flags_of(kind.of)
-    return {"name": kind.name, "shown": sensor.shown, "flags": flags}
+    return {"name": kind.name, "shown": sensor.shown, "flags": flags_of(kind.type_)}
 
 
 def write_order() -> str:
-    """The order in which situations are told."""
+    """The order in which situations are shown."""
     rows = "".join(f'  {kind}: "{level}",\n' for kind, level in ORDER.items())
     return f"{_ORDER_HEAD}export const ORDER = /** @type {{const}} */ ({{\n{rows}}});\n"
 

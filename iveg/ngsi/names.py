@@ -1,4 +1,4 @@
-"""The fixed names of the wire: topics, attributes, devices, entities."""
+"""Fixed names of the wire: topics, attributes, devices, entities."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,11 +20,11 @@ CLIMATE_ID, CLIMATE_TYPE = "greenhouse-climate", "IndoorEnvironmentObserved"
 HEARTBEAT_ID, HEARTBEAT_TYPE = "iveg-canary", "Probe"
 CLIMATE_DEVICE = "climate"
 PROTOCOL = "JSON"
-"""Of the IoT Agent."""
+"""Protocol of the IoT Agent."""
 
 
-def _attributes(of: type[Observation]) -> list[str]:
-    return [name for name, _ in KIND_OF[of].attributes]
+def _attributes(observation: type[Observation]) -> list[str]:
+    return [name for name, _ in KIND_OF[observation].attributes]
 
 
 (ODOMETRY,) = _attributes(Odometry)
@@ -33,11 +33,11 @@ BOXES, BOXES_HEADER = _attributes(DetectionFrame)
 (SAFETY,) = _attributes(SafetyReport)
 (NAVIGATION,) = _attributes(Navigation)
 UNPLACED = "unplaced"
-"""``frame_id`` of what a robot sensed without knowing where."""
+"""``frame_id`` of data that a robot sensed without a pose."""
 COMMAND, COMMAND_STATUS, COMMAND_INFO = "cmd", "cmd_status", "cmd_info"
 GOAL, GOAL_INFO = "goal", "goal_info"
 COMMANDS = (COMMAND, GOAL)
-"""NGSI commands of a robot, by what they carry: STOP and its end; goals."""
+"""NGSI commands of a robot: STOP, release and resume; goals."""
 ALGORITHM_1 = {
     "class": "Text",
     "conf": "Number",
@@ -46,7 +46,7 @@ ALGORITHM_1 = {
     "laser_scan": "array",
     "timestamp": "Text",
 }
-"""Attributes of the single payload, with their NGSI types."""
+"""Attributes of Algorithm 1's single payload, with their NGSI types."""
 
 FEEDBACK_TOPIC = "/{robot_id}/mqtt_feedback"
 FEEDBACK_FILTER = "/+/mqtt_feedback"
@@ -58,22 +58,22 @@ PEER_SCAN_END = PEER_SCAN_FILTER.removeprefix("/+")
 
 @dataclass(frozen=True, slots=True)
 class RobotDevice:
-    """One IoT Agent device: what it measures and whether it takes commands.
+    """IoT Agent device of a robot: its measures and whether it takes commands.
 
     Attributes:
-        suffix: After the robot id in the device id and topic; empty for the robot.
-        attributes: NGSI attribute name and type.
-        of: What its measures observe; None for the device of everything.
+        suffix: Text after the robot id in device id and topic; empty for the robot.
+        attributes: Names and NGSI types of the attributes.
+        observation: Kind of its measures; None for the device of all kinds.
     """
 
     suffix: str
     attributes: tuple[tuple[str, str], ...]
-    of: type[Observation] | None = None
+    observation: type[Observation] | None = None
 
     @property
     def has_command(self) -> bool:
-        """Whether the robot's orders go to it: the device of everything."""
-        return self.of is None
+        """Whether it takes the robot's orders; the device of all kinds does."""
+        return self.observation is None
 
 
 ROBOT_DEVICES = (
@@ -84,10 +84,10 @@ ROBOT_DEVICES = (
             *(pair for kind in MEASURED for pair in kind.attributes),
         ),
     ),
-    *(RobotDevice(kind.suffix or "", kind.attributes, kind.of) for kind in MEASURED),
+    *(RobotDevice(kind.suffix or "", kind.attributes, kind.type_) for kind in MEASURED),
 )
-"""The command device sorts before its sensors, and is provisioned last where the agent
-keeps its registry in memory, so that either registry picks it (docs/fiware.md)."""
+"""Command device first.  It sorts before its sensors, for an agent with MongoDB, and is
+provisioned last, for one with its registry in memory: both pick it (docs/fiware.md)."""
 
 
 def measure_topic(apikey: str, device_id: str) -> str:
@@ -96,10 +96,10 @@ def measure_topic(apikey: str, device_id: str) -> str:
 
 
 def direct_topic(robot_id: str, suffix: str) -> str:
-    """Where a robot tells iVeg alone what its device ``suffix`` measures.
+    """Topic of a device's measures for iVeg alone.
 
-    The IoT Agent does not listen there (it does to ``/+/+/attrs`` and ``/+/+/cmdexe``),
-    so it costs the agent nothing.
+    The IoT Agent subscribes to ``/+/+/attrs`` and ``/+/+/cmdexe``, so that this topic
+    costs the agent nothing.
     """
     return f"/{robot_id}/iveg/{suffix.removeprefix('_')}"
 
@@ -116,26 +116,26 @@ def answer_topic(apikey: str, robot_id: str) -> str:
 
 @lru_cache(maxsize=1024)
 def robot_of_device(device_id: str) -> str:
-    """The robot that a device belongs to: ``AGI_odom`` → ``AGI``."""
+    """Robot of a device: ``AGI_odom`` → ``AGI``."""
     for device in ROBOT_DEVICES:
         if device.suffix and device_id.endswith(device.suffix):
             return device_id.removesuffix(device.suffix)
     return device_id
 
 
-_HEADERS = {LIDAR: LIDAR_HEADER, BOXES: BOXES_HEADER}
-"""Attributes whose origin keys stand in another one."""
+HEADERS = {LIDAR: LIDAR_HEADER, BOXES: BOXES_HEADER}
+"""Attributes whose origin keys stand in another attribute."""
 
 
 def refuse_another_robot(
     robot_id: str, attributes: Mapping[str, object], name: str
 ) -> None:
-    """Refuse what says that another robot sent it than its topic or entity does.
+    """Refuse a message that names another robot than its topic or entity does.
 
     Raises:
         UnreadableError: ``another_robot``.
     """
-    value, header = attributes.get(name), attributes.get(_HEADERS.get(name, name))
+    value, header = attributes.get(name), attributes.get(HEADERS.get(name, name))
     for part in (attributes, value, header):
         if isinstance(part, dict) and part.get("robot_id", robot_id) != robot_id:
             raise UnreadableError("another_robot", f"{name} names another robot")

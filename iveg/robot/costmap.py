@@ -1,7 +1,8 @@
 """Costmap of the fleet on a robot, from peers' lasers and iVeg's feedback.
 
-The paper's shared costmap.  What a peer's laser met and bodies of people and peers are
-lethal, zones about them dear; what nobody speaks of is unknown, and becomes so again.
+The paper's shared costmap.  Returns of a peer's laser and bodies of people and peers
+are lethal, and their zones cost more towards the middle.  Cells that no message covers
+are unknown, and become so again.
 The robot's own laser is left out: its navigation has that first-hand, and here it
 would only come late.
 """
@@ -33,14 +34,15 @@ from iveg.robot.peer_alerts import Neighbour
 
 _log = logging.getLogger(__name__)
 HALF_LIFE_S = 5.0
-"""A peer is heard twice a second: what it sees stays known, what it left does not."""
+"""Half-life of a cell's evidence (s): scans of a peer come twice a second, so what it
+sees stays known and what it left does not."""
 LETHAL = 100
 _TAKEN = 18
 """Cost of a cell that is taken with a probability of 0.65, as map servers count it."""
 _WIDEST_M = 1000.0
 """Longer than any greenhouse: an open field, mapped in a window."""
 _BESIDE_M = 0.5
-"""A peer's laser point so near to this robot is this robot (m)."""
+"""A peer's laser point this near to the robot is the robot itself (m)."""
 
 
 class FleetCostmap:
@@ -49,20 +51,23 @@ class FleetCostmap:
     Args:
         robot_id: This robot.
         outline: Its footprint, which is never an obstacle.
-        area: What the grid covers; None, or an open field: a window round the robot.
+        area: Area of the grid; None, or an open field: a window round the robot.
     """
 
     def __init__(
         self, robot_id: str, outline: Outline, area: Rectangle | None = None
     ) -> None:
         self._me, self._outline = robot_id, outline
-        self._fixed = None if area is None or _is_open(area) else Grid.over(area)
+        self._fixed: Grid | None = None
+        if area is not None:
+            widest_m = max(area.xmax - area.xmin, area.ymax - area.ymin)
+            self._fixed = Grid.over(area) if widest_m <= _WIDEST_M else None
         self._known: Occupancy | None = None
         self._waiting: dict[str, PeerScan] = {}
         self._newest: dict[str, Origin] = {}
         self._logged: set[str] = set()
 
-    def hear(
+    def receive(
         self, topic: str, payload: bytes, own: Pose2D | None, iveg_s: float | None
     ) -> None:
         """Take a message of ``/{peer}/iveg/peer_scan``; a bad one is ignored.
@@ -88,7 +93,7 @@ class FleetCostmap:
         self._waiting[peer] = scan.without(beside)
 
     def drain_scans(self) -> list[PeerScan]:
-        """The newest scan of each peer since the last time."""
+        """Newest scan of each peer since the last call; each is returned once."""
         waiting, self._waiting = self._waiting, {}
         return list(waiting.values())
 
@@ -103,8 +108,7 @@ class FleetCostmap:
         known = self._known = self._placed(own)
         known.fade(now)
         for scan in scans:
-            sweep = sweep_of(scan.scan(), scan.pose, known.grid, scan.returns())
-            known.add(sweep)
+            known.add(sweep_of(scan.scan(), scan.pose, known.grid, scan.returns()))
         costmap = known.costs()
         cost, grid = costmap.data, known.grid
         cost[cost >= _TAKEN] = LETHAL
@@ -123,8 +127,12 @@ class FleetCostmap:
 
     def _is_newer(self, peer: str, origin: Origin) -> bool:
         before = self._newest.get(peer)
-        is_counted = before is not None and before.boot == origin.boot
-        if before and is_counted and (origin.seq or 0) <= (before.seq or 0):
+        # Stamps prove no order; the count of a boot does, and a new boot begins anew.
+        if (
+            before is not None
+            and before.boot == origin.boot
+            and (origin.seq or 0) <= (before.seq or 0)
+        ):
             return False
         self._newest[peer] = origin
         return True
@@ -142,10 +150,6 @@ def _refuse_another_time(stamp_s: float | None, iveg_s: float | None) -> None:
     if abs(ahead_s) > OLDEST_S:
         reason = "from_the_future" if ahead_s > 0.0 else "too_old"
         raise UnreadableError(reason, f"{abs(ahead_s):.1f} s off the feedback")
-
-
-def _is_open(area: Rectangle) -> bool:
-    return max(area.xmax - area.xmin, area.ymax - area.ymin) > _WIDEST_M
 
 
 def _lay(cost: NDArray[np.int8], grid: Grid, near: Neighbour) -> None:
@@ -167,18 +171,15 @@ def _clear_own(
     reach = math.hypot(outline.length, outline.width) / 2 + beside
     cells = grid.window(own.x, own.y, reach)
     dx, dy = grid.offsets(cells, 0.0, 0.0)
-    x, y = np.broadcast_arrays(dx, dy)
-    points = np.stack((x, y), axis=-1)
+    points = np.stack(np.broadcast_arrays(dx, dy), axis=-1)
     cost[cells][_within(outline, own, points, beside)] = UNKNOWN
 
 
 def _within(
     outline: Outline, own: Pose2D, points: NDArray[np.float32], beside: float
 ) -> NDArray[np.bool_]:
-    """Which points, shape (…, 2) in ``map``, are in the footprint or ``beside`` (m)."""
-    dx, dy = points[..., 0] - own.x, points[..., 1] - own.y
-    along = dx * math.cos(own.yaw) + dy * math.sin(own.yaw)
-    across = dy * math.cos(own.yaw) - dx * math.sin(own.yaw)
+    """Mask of points, shape (…, 2), in the footprint or within ``beside`` (m) of it."""
+    along, across = own.inverse(*np.moveaxis(points, -1, 0))
     inside: NDArray[np.bool_] = (np.abs(along) <= outline.length / 2 + beside) & (
         np.abs(across) <= outline.width / 2 + beside
     )

@@ -1,4 +1,4 @@
-"""iVeg's feedback on the robot: its age, what it says of others, and who said it."""
+"""iVeg's feedback on the robot: its age, the people and peers in it, its authors."""
 
 from collections import OrderedDict, deque
 from collections.abc import Iterable, Iterator
@@ -18,7 +18,7 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import FeedbackRef
 from iveg.domain.wire import FORBIDDEN
 from iveg.domain.witness import KnownPeer
-from iveg.robot.gate import FREE, Ahead, Cap, known_reason, quantised
+from iveg.robot.gate import FREE, Cap, CappedZone, known_reason, quantised
 from iveg.robot.peer_alerts import (
     PEER_M,
     KeptAlert,
@@ -26,8 +26,8 @@ from iveg.robot.peer_alerts import (
     PeerObserver,
     PeerTopic,
     RuleRadii,
-    alert_ahead,
-    alerted,
+    alert_cap,
+    alert_zone,
     alerts_of,
     is_alive,
     is_inside,
@@ -40,8 +40,8 @@ from iveg.robot.peer_alerts import (
 #
 # Age of iVeg's feedback, judged by the reports that iVeg acknowledges.
 #
-# A delayed message is not fresh: feedback is as old as the report that it acknowledges,
-# counted from its sending (docs/interfaces/mqtt.md), not as its own arrival.
+# A delayed message is not fresh: the age of feedback counts from the sending of the
+# report that it acknowledges (docs/interfaces/mqtt.md), not from its own arrival.
 
 _REPORTS_KEPT = 512
 _STEADY_S, _STEADY_MESSAGES = 2.0, 4
@@ -57,8 +57,7 @@ class Watchdog:
     """
 
     def __init__(self, boot_at: float, slow_s: float) -> None:
-        self._boot_at = boot_at
-        self._slow_s = slow_s
+        self._boot_at, self._slow_s = boot_at, slow_s
         self._sent: OrderedDict[int, float] = OrderedDict()
         self._evidence: float | None = None
         self._fresh_since: float | None = None
@@ -71,17 +70,17 @@ class Watchdog:
         if len(self._sent) > _REPORTS_KEPT:
             self._sent.popitem(last=False)
 
-    def sent_at(self, seen: int | None) -> float | None:
-        """When a report was sent; None of a number that never was, or of none."""
-        return None if seen is None else self._sent.get(seen)
+    def sent_at(self, seq: int | None) -> float | None:
+        """Time at which the report ``seq`` was sent; None: it never was."""
+        return None if seq is None else self._sent.get(seq)
 
-    def heard(self, seen: int | None, now: float) -> None:
-        """Take a feedback, of any author, that has seen our reports up to ``seen``.
+    def received(self, seq: int | None, now: float) -> None:
+        """Take a feedback, of any author, that acknowledges our reports up to ``seq``.
 
         A number that was never sent, or none, is no evidence of freshness.
         """
         self.tick(now)
-        evidence = self.sent_at(seen)
+        evidence = self.sent_at(seq)
         if evidence is None:
             return
         if self._evidence is None or evidence > self._evidence:
@@ -92,7 +91,7 @@ class Watchdog:
             self._fresh_count += 1
 
     def tick(self, now: float) -> None:
-        """Notice that time has passed: after an interruption freshness counts anew."""
+        """Take note of the time: after an interruption freshness counts anew."""
         age = self.age(now)
         if age is None or age > self._slow_s:
             self._fresh_since = None
@@ -120,18 +119,19 @@ class Watchdog:
 
     def may_clear(self, now: float) -> bool:
         """Whether a new ``link`` hold may clear itself: at most thrice a minute."""
+        # A radio that comes and goes must not start the robot again and again.
         recent = [at for at in self._clears if now - at < _CLEARS_WITHIN_S]
         return len(recent) < _CLEARS
 
 
 # --- peer feedback ----------------------------------------------------------------
 #
-# Feedback of every peer topic of one author: what the robot knows of others.
+# Feedback of every peer topic of one author: the people and peers that it names.
 #
 # Algorithm 3 of the paper, judged against the robot's own pose. It differs in four
-# ways: a person missing from a message ages out instead of being dropped, a radius
-# grows while its topic is silent (docs/safety.md), a peer known to stand slows nobody,
-# and an alert about the robot itself is ignored, or it would slow down for ever.
+# ways. A person missing from a message ages out instead of being dropped. A radius
+# grows while its topic is silent (docs/safety.md). A peer known to stand slows nobody.
+# An alert about the robot itself is ignored, or the robot would slow for ever.
 
 MYSELF_WITHIN_M = 1.0
 _MAX_TOPICS, _MAX_ALERTS = 64, 512
@@ -141,7 +141,7 @@ class PeerFeedback:
     """All feedback that one robot received of one author.
 
     Args:
-        robot_id: Whose speed limits count.
+        robot_id: Robot whose speed limits count.
     """
 
     def __init__(self, robot_id: str) -> None:
@@ -151,27 +151,28 @@ class PeerFeedback:
 
     def newest(self, topic: str) -> int:
         """Count of the newest message of a topic; −1 before the first."""
-        memory = self._topics.get(topic)
-        return -1 if memory is None else memory.seq
+        state = self._topics.get(topic)
+        return -1 if state is None else state.seq
 
     def apply(
         self, topic: str, feedback: Feedback, own: Pose2D | None, now: float
     ) -> None:
         """Apply the newest message of ``topic``."""
-        memory = self._topics.get(topic)
-        if memory is None:
-            memory = PeerTopic(now)
+        state = self._topics.get(topic)
+        if state is None:
+            state = PeerTopic(now)
             self._make_room()
-            self._topics[topic] = memory
-        memory.seq, memory.at = feedback.origin.seq or 0, now
-        memory.peer = self._peer(memory, feedback, now)
-        memory.speed_limit = feedback.speed_limits.get(self._me, UNSUPERVISED)
-        memory.foresight = feedback.foresight
+            self._topics[topic] = state
+        state.seq, state.at = feedback.origin.seq or 0, now
+        state.peer = self._peer(state, feedback, now)
+        # Without a name it is not supervised (docs/safety.md, "Clear"): half speed.
+        state.speed_limit = feedback.speed_limits.get(self._me, UNSUPERVISED)
+        state.foresight = feedback.foresight
         self._radii.note(feedback.rule.get("radius_m", {}), now)
-        self._remember(memory, feedback, own, now)
+        self._remember(state, feedback, own, now)
 
     def peers(self, now: float) -> Iterator[KnownPeer]:
-        """Where every peer is that was heard of within a second."""
+        """Every peer whose pose is at most a second old, at that pose."""
         for topic in self._topics.values():
             if topic.peer is not None and now - topic.peer.at <= LIMITS.silence_s:
                 yield KnownPeer(topic.peer.pose, topic.peer.stands)
@@ -181,7 +182,7 @@ class PeerFeedback:
 
         Args:
             own: None while the robot is not localised.
-            slowed: The robot is already slow for a person or peer: release is delayed.
+            slowed: The robot is slow for a person or peer: zones are 0.3 m wider.
             now: Monotonic (s).
         """
         beyond = LIMITS.release_beyond_m if slowed else 0.0
@@ -191,40 +192,40 @@ class PeerFeedback:
             if silence > LIMITS.zone_lasts_s:
                 continue
             yield _mandated(topic.speed_limit, silence)
-            for kept in topic.alerts.values():
-                if kept.myself or not is_alive(kept, topic, now):
+            for item in topic.alerts.values():
+                if item.myself or not is_alive(item, topic, now):
                     continue
-                zone_m = zone_radius(kept.alert, self._radii, silence, now) + beyond
-                if is_inside(kept.alert, topic.peer, own, zone_m):
-                    # One that is missing has been kept for its second already.
-                    yield alerted(kept.alert, waits=kept.missing_since is None)
+                zone_m = zone_radius(item.alert, self._radii, silence, now) + beyond
+                if is_inside(item.alert, topic.peer, own, zone_m):
+                    # The second for which a missing alert is kept is its release delay.
+                    yield alert_cap(item.alert, waits=item.missing_since is None)
             if topic.peer is not None and own is not None:
                 yield topic.peer.cap(name, own, radius_m, beyond, now)
 
-    def ahead(self, now: float) -> Iterator[Ahead]:
+    def capped_zones(self, now: float) -> Iterator[CappedZone]:
         """Zones whose motion is known, where the rule looks ahead."""
         for name, topic in self._topics.items():
             if not topic.foresight or now - topic.at > LIMITS.silence_s:
                 continue
-            for kept in topic.alerts.values():
-                if not kept.myself and kept.missing_since is None:
-                    yield from alert_ahead(kept, self._radii, now)
+            for item in topic.alerts.values():
+                if not item.myself and item.missing_since is None:
+                    yield from alert_zone(item, self._radii, now)
             peer = topic.peer
             if peer is not None and not peer.stands:
-                yield from peer.ahead(name, self._radii.fresh_m("robot", now), now)
+                yield from peer.zone(name, self._radii.fresh_m("robot", now), now)
 
     def neighbours(self, now: float) -> Iterator[Neighbour]:
         """People and robots of messages that are young enough to give positions.
 
-        A peer whose pose stays the same message for ``zone_lasts_s`` is left out:
-        nobody knows any more where it is, or that it is there at all.
+        A peer whose pose stays the same message for ``zone_lasts_s`` is left out, as it
+        may be anywhere or gone.
         """
         for name, topic in self._topics.items():
             if now - topic.at > LIMITS.feedback_stand_s:
                 continue
-            for kept in topic.alerts.values():
-                if not kept.myself and kept.missing_since is None:
-                    yield from neighbour_of(kept.alert, self._radii, now)
+            for item in topic.alerts.values():
+                if not item.myself and item.missing_since is None:
+                    yield from neighbour_of(item.alert, self._radii, now)
             peer = topic.peer
             if peer is not None and now - peer.at <= LIMITS.zone_lasts_s:
                 zone_m = self._radii.fresh_m("robot", now)
@@ -237,6 +238,7 @@ class PeerFeedback:
         if feedback.robot_id == self._me or feedback.pose is None:
             return None
         before, stamp = topic.peer, feedback.pose_stamp
+        # A pose with the stamp of before was not measured anew: its age goes on.
         if before is not None and stamp is not None and before.stamp == stamp:
             return replace(before, pose=feedback.pose)
         pose, twist, stands = feedback.pose, feedback.twist or REST, False
@@ -247,6 +249,7 @@ class PeerFeedback:
         return PeerObserver(pose, twist.linear_x, stands, stamp, now)
 
     def _make_room(self) -> None:
+        # The longest silent topic gives way: its zones end first.
         if len(self._topics) >= _MAX_TOPICS:
             del self._topics[min(self._topics, key=lambda name: self._topics[name].at)]
 
@@ -254,18 +257,18 @@ class PeerFeedback:
         self, topic: PeerTopic, feedback: Feedback, own: Pose2D | None, now: float
     ) -> None:
         received = alerts_of(feedback)
-        kept = {
+        alerts = {
             key: known
             for key, known in topic.alerts.items()
             if is_alive(known, topic, now)
         }
-        for key, known in kept.items():
+        for key, known in alerts.items():
             if key not in received and known.missing_since is None:
-                kept[key] = replace(known, missing_since=now)
+                alerts[key] = replace(known, missing_since=now)
         for key, alert in received.items():
-            myself = self._is_me(alert, topic, own, kept.get(key))
-            kept[key] = KeptAlert(alert, now, None, myself)
-        topic.alerts = dict(list(kept.items())[-_MAX_ALERTS:])
+            myself = self._is_me(alert, topic, own, alerts.get(key))
+            alerts[key] = KeptAlert(alert, now, None, myself)
+        topic.alerts = dict(list(alerts.items())[-_MAX_ALERTS:])
 
     def _is_me(
         self,
@@ -282,14 +285,19 @@ class PeerFeedback:
         if alert.position is None or own is None:
             return False
         near = own.distance_to(*alert.position[:2]) <= MYSELF_WITHIN_M
-        # The robot moves on; the place where it was seen still belongs to it.
-        same_spot = before is not None and before.alert.position == alert.position
-        return near or (same_spot and before is not None and before.myself)
+        # The robot has moved on from the place where it was detected.
+        is_still_there = (
+            before is not None
+            and before.myself
+            and before.alert.position == alert.position
+        )
+        return near or is_still_there
 
 
 def _mandated(speed_limit: SpeedLimit, silence: float) -> Cap:
-    """The cap that iVeg asks for; whoever says no more for a second holds nobody."""
+    """The cap that iVeg asks for; after a second of silence at least half speed."""
     factor = quantised(speed_limit.speed_factor)
+    # R7 decides when a silent iVeg makes a robot stand, not its last word.
     if silence > LIMITS.silence_s:
         factor = max(factor, HALF_SPEED)
     if factor == FULL_SPEED:
@@ -300,36 +308,40 @@ def _mandated(speed_limit: SpeedLimit, silence: float) -> Cap:
 
 # --- authors ----------------------------------------------------------------------
 #
-# Authors of feedback, each kept apart; the least that any of them allows is applied.
+# Authors of feedback, each kept apart; the lowest limit of any is applied.
 #
-# An author is one run of an iVeg, named by the ``boot`` of its messages. Whatever does
-# not go on its count is another author of that name, so that no message, whatever
-# number it bears, makes a robot drop what iVeg says next. An author that is silent for
-# a second counts as half speed, and is forgotten ten seconds after its last word
+# An author is one run of an iVeg, named by the ``boot`` of its messages. A message that
+# does not continue its count belongs to another author of that name. So no message,
+# whatever its number, makes a robot drop iVeg's next ones. An author that is silent for
+# a second counts as half speed, and is forgotten ten seconds after its last message
 # (docs/safety.md, "Silence is not full speed").
 
 MOST_AUTHORS = 4
-"""More than a site has; with one more nobody knows whom to believe: half speed."""
+"""More than a site has; one more is half speed, since any of them may be false."""
 _COPIES_KNOWN = 64
+_MOMENTS_KEPT = 4096
+"""Messages whose moments are kept: of ten seconds and more, with twenty robots."""
 _MOST_NEIGHBOURS = 256
 _SILENT = Cap(HALF_SPEED, "watchdog")
 
 
 @dataclass(slots=True)
 class Author:
-    """One author's word.
+    """One author and its feedback.
 
     Attributes:
         newest: Its highest ``seq``, which goes over all topics.
-        spoke_at: When its newest message came (monotonic, s).
-        seen_at: When the newest of our reports that it has seen was sent; None: none.
-        recent: Its newest messages, by which copies are known.
+        received_at: When its newest message came (monotonic, s).
+        seen_at: When the newest of our reports that it has seen was sent (monotonic,
+            s); None: it has seen none.
+        backlog_s: Orion's backlog as it reports it (s); None: unknown.
+        recent: Its newest messages, by which copies are recognised.
     """
 
     boot: str
     peer_feedback: PeerFeedback
     newest: int
-    spoke_at: float
+    received_at: float
     seen_at: float | None = None
     backlog_s: float | None = None
     recent: deque[Feedback] = field(default_factory=lambda: deque(maxlen=_COPIES_KNOWN))
@@ -343,16 +355,19 @@ class Authors:
     """All feedback that one robot received, by author.
 
     Args:
-        robot_id: Whose speed limits count.
+        robot_id: Robot whose speed limits count.
         slow_s: Feedback older than this halves the speed.
     """
 
     def __init__(self, robot_id: str, slow_s: float) -> None:
         self._me, self._slow_s = robot_id, slow_s
         self._kept: list[Author] = []
-        """In the order in which they were met."""
+        """Authors in the order of their first messages."""
         self._crowded_at = float("-inf")
-        self._newest: FeedbackRef | None = None
+        self._newest: deque[tuple[tuple[float, FeedbackRef], ...]] = deque(
+            maxlen=_MOMENTS_KEPT
+        )
+        """Newest message of each author, and when it came, after each message."""
         self.newest_stamp_s: float | None = None
         """Stamp of the newest message, by iVeg's clock (Unix s)."""
 
@@ -374,11 +389,12 @@ class Authors:
             now: Monotonic (s).
 
         Returns:
-            Whether it is news; copies are none, nor messages without count or name,
-            or with a name that Orion would refuse in what the robot echoes.
+            Whether it is news. Copies are not, nor messages without a count or with
+            an unusable name.
         """
         boot, seq = feedback.origin.boot, feedback.origin.seq
         self._forget(now)
+        # The robot echoes the name, and Orion would refuse its reports with such text.
         if not boot or seq is None or not FORBIDDEN.isdisjoint(boot):
             return False
         if self._is_copy(topic, feedback, boot, seq):
@@ -386,30 +402,39 @@ class Authors:
         author = self._author_of(topic, boot, seq, now)
         if author is None:
             return True
-        author.newest, author.spoke_at = max(author.newest, seq), now
+        author.newest, author.received_at = max(author.newest, seq), now
         if seen_at is not None:
             author.seen_at = max(seen_at, author.seen_at or seen_at)
         author.backlog_s = feedback.backlog_s
         author.recent.append(feedback)
         author.peer_feedback.apply(topic, feedback, own, now)
-        self._newest = FeedbackRef(boot, author.newest)
+        self._newest.append(
+            tuple(
+                (author.received_at, FeedbackRef(author.boot, author.newest))
+                for author in self._kept
+            )
+        )
         self.newest_stamp_s = feedback.origin.stamp_s or self.newest_stamp_s
         return True
 
-    def echoes(self, now: float) -> tuple[FeedbackRef, ...]:
-        """Newest message of each author, of the one met first at first.
+    def echoes(self, at: float) -> tuple[FeedbackRef, ...]:
+        """Newest message of each author by a moment, the author known longest first.
 
-        Once all are forgotten, the last one's; empty before the first.
+        Once all are forgotten, that of the last author; empty before the first, and for
+        a moment before those that are kept.
         """
-        self._forget(now)
-        kept = tuple(FeedbackRef(author.boot, author.newest) for author in self._kept)
-        return kept or (() if self._newest is None else (self._newest,))
+        for newest in reversed(self._newest):
+            last = max(came for came, _ in newest)
+            if last <= at:
+                kept_from = min(last, at - LIMITS.zone_lasts_s)
+                return tuple(ref for came, ref in newest if came >= kept_from)
+        return ()
 
     def backlog_s(self) -> float | None:
-        """Largest backlog of Orion that an author tells (s); None where none does."""
-        told = (author.backlog_s for author in self._kept)
+        """Largest backlog of Orion that an author reports (s); None where none does."""
+        reported = (author.backlog_s for author in self._kept)
         return max(
-            (backlog_s for backlog_s in told if backlog_s is not None), default=None
+            (backlog_s for backlog_s in reported if backlog_s is not None), default=None
         )
 
     def caps(self, own: Pose2D | None, slowed: bool, now: float) -> Iterator[Cap]:
@@ -422,42 +447,44 @@ class Authors:
         if now - self._crowded_at <= LIMITS.zone_lasts_s:
             yield _SILENT
 
-    def ahead(self, now: float) -> Iterable[Ahead]:
+    def capped_zones(self, now: float) -> Iterable[CappedZone]:
         """Zones whose motion is known, where an author's rule looks ahead."""
         return chain.from_iterable(
-            author.peer_feedback.ahead(now) for author in self._kept
+            author.peer_feedback.capped_zones(now) for author in self._kept
         )
 
     def peers(self, now: float) -> Iterable[KnownPeer]:
-        """Peers; none where two authors speak, as they explain obstacles."""
+        """Peers that explain what the laser sees; none while two authors speak."""
         self._forget(now)
+        # A false author could explain a person away, and either may be false.
         return self._kept[0].peer_feedback.peers(now) if len(self._kept) == 1 else ()
 
     def neighbours(self, now: float) -> list[Neighbour]:
-        """People and peers of all authors; two at the same place are one."""
-        found = chain.from_iterable(
+        """People and peers of all authors; two of a kind in a place are merged."""
+        neighbours = chain.from_iterable(
             author.peer_feedback.neighbours(now) for author in self._kept
         )
         places = {
-            (near.kind, round(near.x, 1), round(near.y, 1)): near for near in found
+            (near.kind, round(near.x, 1), round(near.y, 1)): near for near in neighbours
         }
         return [*places.values()][:_MOST_NEIGHBOURS]
 
     def _forget(self, now: float) -> None:
         last = now - LIMITS.zone_lasts_s
-        self._kept = [author for author in self._kept if author.spoke_at >= last]
+        self._kept = [author for author in self._kept if author.received_at >= last]
 
     def _named(self, boot: str) -> Iterator[Author]:
         return (author for author in self._kept if author.boot == boot)
 
     def _is_copy(self, topic: str, feedback: Feedback, boot: str, seq: int) -> bool:
+        # By content too: a stranger's message may bear a number of iVeg's count.
         return any(
             seq <= author.peer_feedback.newest(topic) and feedback in author.recent
             for author in self._named(boot)
         )
 
     def _author_of(self, topic: str, boot: str, seq: int, now: float) -> Author | None:
-        """Author whose count this goes on, or a new one; None: there is no room."""
+        """Author whose count a message continues, or a new author; None: no room."""
         counts = [
             author
             for author in self._named(boot)
@@ -467,8 +494,8 @@ class Authors:
             return min(counts, key=lambda author: abs(seq - author.newest))
         if len(self._kept) >= MOST_AUTHORS:
             self._crowded_at = now
-            quiet = min(self._kept, key=lambda author: author.spoke_at)
-            if now - quiet.spoke_at <= LIMITS.silence_s:
+            quiet = min(self._kept, key=lambda author: author.received_at)
+            if now - quiet.received_at <= LIMITS.silence_s:
                 return None
             self._kept.remove(quiet)
         author = Author(boot, PeerFeedback(self._me), seq, now)

@@ -1,7 +1,7 @@
 """Speed caps of a robot, its own foresight, and the gate before the drive."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from iveg.domain.feedback import FULL_SPEED, HALF_SPEED
@@ -12,6 +12,8 @@ from iveg.domain.rule.paths import (
     HORIZON_S,
     MOVES_M_S,
     PLAN_LASTS_S,
+    Meeting,
+    MovingZone,
     MovingZones,
     Plan,
     path_ahead,
@@ -26,8 +28,7 @@ from iveg.domain.rule.paths import (
 # Factors are 0, 0.5 or 1 and are never multiplied (docs/safety.md): two overlapping
 # zones still halve the speed. A raw cap that falls applies immediately; one that rises
 # must stay up for one second first, and a lower cap within that second counts. A cap
-# that is told to be over, and is lifted by itself a second later, waits for no second
-# one.
+# whose reason ended while it still applies (``waits`` False) has no further second.
 
 _REASONS = (
     *("clear", "unsupervised", "stale", "doubt", "watchdog"),
@@ -41,14 +42,19 @@ class Cap:
     """One reason not to drive faster than ``factor``.
 
     Attributes:
-        waits: Whether it is lifted a second after it is heard no more; else its reason
-            has ended, and that second is counted while it is still heard.
+        factor: Share of the greatest speed: 0, 0.5 or 1.
+        reason: One of ``_REASONS``.
+        cause: Robot or hold behind the reason; None without.
+        decision_id: Decision of iVeg that it follows; None without.
+        waits: Whether it ends a second after its last receipt.  False: its reason has
+            ended, and that second already runs.
     """
 
     factor: float
     reason: str
     cause: str | None = None
     decision_id: str | None = None
+    # Not compared, since reports do not show it.
     waits: bool = field(default=True, compare=False)
 
     def _order(self) -> tuple[float, int, bool, bool]:
@@ -60,7 +66,7 @@ FREE = Cap(FULL_SPEED, "clear")
 
 
 def quantised(factor: float) -> float:
-    """Largest allowed factor that is not above the given one."""
+    """Largest allowed factor that is not above the given one (R6)."""
     if factor >= FULL_SPEED:
         return FULL_SPEED
     return HALF_SPEED if factor >= HALF_SPEED else 0.0
@@ -89,7 +95,7 @@ class AppliedCap:
     since: float = 0.0
 
     def settle(self, raw: Cap, now: float) -> "AppliedCap":
-        """Apply the present raw cap: a lower one at once, a higher one after 1.0 s."""
+        """Apply the present raw cap: at once when lower, after 1.0 s when higher."""
         if raw.factor <= self.cap.factor:
             return AppliedCap(raw)
         if self.waiting is None:
@@ -97,6 +103,7 @@ class AppliedCap:
         waiting = lowest((self.waiting, raw))
         if now - self.since < LIMITS.release_after_s:
             return AppliedCap(self.cap, waiting, self.since)
+        # ``raw`` may exceed every cap of that second: then its own second begins.
         return AppliedCap(waiting).settle(raw, now)
 
 
@@ -104,18 +111,18 @@ class AppliedCap:
 #
 # Foresight on the robot itself, by its own odometry and plan: it needs no network.
 #
-# The same arithmetic as the server's (``iveg.domain.rule.paths``), for the people and
-# peers that feedback told; it only adds a cap (docs/safety.md, "Foresight").
+# It shares the server's arithmetic (``iveg.domain.rule.paths``), takes the people and
+# peers of the feedback, and only adds a cap (docs/safety.md, "Foresight").
 
-Ahead = tuple[tuple[float, ...], Cap]
-"""A zone as ``MovingZones`` has it, and the cap that it asks for inside."""
+CappedZone = tuple[MovingZone, Cap]
+"""A zone, and the cap that applies inside."""
 
 
 class Lookahead:
     """Foresight of one robot.
 
     Args:
-        braking: What its brakes can do (m/s²).
+        braking: Deceleration of its brakes (m/s²).
     """
 
     def __init__(self, braking: float) -> None:
@@ -126,50 +133,49 @@ class Lookahead:
         self._speed_before = 0.0
 
     def note_path(self, path: Plan, now: float) -> None:
-        """Note the robot's own plan (monotonic, s); one that is no number is none."""
+        """Note the robot's own plan; a point that is not finite makes it no plan."""
         is_read = all(math.isfinite(number) for point in path for number in point)
         self._plan, self._plan_at = path if is_read else None, now
 
     def is_due(self, now: float) -> bool:
-        """Whether the last look is old (monotonic, s)."""
+        """Whether the last look is ``EVERY_S`` old."""
         return not 0.0 <= now - self._at < EVERY_S
 
     def look(
-        self, pose: Pose2D, twist: Twist2D, ahead: Sequence[Ahead], now: float
+        self, pose: Pose2D, twist: Twist2D, zones: Sequence[CappedZone], now: float
     ) -> None:
-        """Find the zones that it is about to reach, to be slow there."""
-        self._at = now
-        if abs(twist.linear_x) < MOVES_M_S or not ahead:
+        """Cap the speed for every zone that the robot is about to reach."""
+        self._at, speed = now, abs(twist.linear_x)
+        if speed < MOVES_M_S or not zones:
             self._caps = ()
             return
-        plan = self._plan if now - self._plan_at <= PLAN_LASTS_S else None
-        zones, speed = MovingZones([row for row, _ in ahead]), abs(twist.linear_x)
         self._speed_before = max(self._speed_before, speed) if self._caps else speed
+        plan = self._plan if now - self._plan_at <= PLAN_LASTS_S else None
+        moving = MovingZones([zone for zone, _ in zones])
 
-        def met(speed: float, within_s: float) -> set[Cap]:
-            """Caps of the zones that it reaches so soon at this speed (m/s)."""
-            _, meetings = zones.met_by(path_ahead(pose, sped_up(twist, speed), plan))
-            return {
-                ahead[meeting.zone][1]
-                for meeting in meetings
-                if meeting.in_s <= within_s
-            }
+        def meetings_at(speed: float) -> Iterator[Meeting]:
+            """First meetings with the zones, at a speed (m/s) or faster."""
+            return moving.met_by(path_ahead(pose, sped_up(twist, speed), plan))[1]
 
-        due, held = met(speed, slows_within_s(self._braking, speed)), set[Cap]()
+        soon_s, meetings = slows_within_s(self._braking, speed), [*meetings_at(speed)]
+        reached_now = {meeting.zone for meeting in meetings if meeting.in_s <= soon_s}
         if self._caps:
-            # What lies ahead again at the speed of before is no reason to speed up.
-            held = met(speed, HORIZON_S) | met(self._speed_before, HORIZON_S)
+            # Else slowing would end an encounter, and speeding up bring it back.
+            meetings += meetings_at(self._speed_before)
+        reached_later = {item.zone for item in meetings if item.in_s <= HORIZON_S}
         self._caps = tuple(
-            cap for _, cap in ahead if cap in due or (cap in held and cap in self._caps)
+            cap
+            for number, (_, cap) in enumerate(zones)
+            if number in reached_now or (number in reached_later and cap in self._caps)
         )
 
     def forget(self) -> None:
-        """Drop what was foreseen: nobody knows where the robot is."""
+        """Drop all encounters, for a robot whose own pose is not known."""
         self._caps, self._at = (), -math.inf
 
     @property
     def cap(self) -> Cap:
-        """Half speed for whom it is about to reach."""
+        """Half speed while an encounter is due; else free."""
         return lowest(self._caps)
 
 
@@ -181,10 +187,13 @@ class Lookahead:
 # during the hold cannot jerk the robot (neutral interlock, docs/safety.md).
 
 NEUTRAL_S = 0.5
+# Navigation that hangs or died must not leave the robot driving.
 TWIST_VALID_S = 0.5
 RAMP_M_S2, RAMP_RAD_S2 = 0.5, 2.0
 _NEUTRAL_BELOW = 1e-3
-_LONGEST_STEP_S = 0.1
+"""A request below this is rest (m/s, rad/s)."""
+# After a pause of the process the speed grows by one late tick, not by the pause.
+_LONGEST_TICK_S = 0.1
 
 
 class Gate:
@@ -199,8 +208,7 @@ class Gate:
     """
 
     def __init__(self, max_speed: float, max_turn: float) -> None:
-        self._max_speed = max_speed
-        self._max_turn = max_turn
+        self._max_speed, self._max_turn = max_speed, max_turn
         self._requested, self._requested_at = REST, -math.inf
         self._last, self._last_at = REST, -math.inf
         self._neutral_needed = True
@@ -231,12 +239,13 @@ class Gate:
         requested = (
             self._requested if now - self._requested_at <= TWIST_VALID_S else REST
         )
+        # R10: rest that was requested while the robot was held does not count.
         if may_drive and self._neutral_needed:
             self._watch_neutral(requested, now)
         if not may_drive or self._neutral_needed:
             requested = REST
-        step = min(_LONGEST_STEP_S, max(0.0, now - self._last_at))
-        self._last = self._ramped(self._limited(requested, factor), step)
+        dt = min(_LONGEST_TICK_S, max(0.0, now - self._last_at))
+        self._last = self._ramped(self._limited(requested, factor), dt)
         self._last_at = now
         return self._last
 
@@ -249,19 +258,20 @@ class Gate:
             self._neutral_needed = False
 
     def _limited(self, requested: Twist2D, factor: float) -> Twist2D:
-        over = max(
+        # By one divisor for both, so that a twist that is too fast keeps its arc.
+        divisor = max(
             1.0,
             abs(requested.linear_x) / self._max_speed,
             abs(requested.angular_z) / self._max_turn,
         )
-        return _scaled(requested, factor / over)
+        return _scaled(requested, factor / divisor)
 
-    def _ramped(self, aim: Twist2D, step: float) -> Twist2D:
-        fastest = _grown(self._last.linear_x, aim.linear_x, RAMP_M_S2 * step)
+    def _ramped(self, aim: Twist2D, dt: float) -> Twist2D:
+        fastest = _grown(self._last.linear_x, aim.linear_x, RAMP_M_S2 * dt)
         if abs(aim.linear_x) > fastest:
             aim = _scaled(aim, fastest / abs(aim.linear_x))
-        most = _grown(self._last.angular_z, aim.angular_z, RAMP_RAD_S2 * step)
-        return Twist2D(aim.linear_x, max(-most, min(most, aim.angular_z)))
+        turn = _grown(self._last.angular_z, aim.angular_z, RAMP_RAD_S2 * dt)
+        return Twist2D(aim.linear_x, max(-turn, min(turn, aim.angular_z)))
 
 
 def _grown(last: float, aim: float, growth: float) -> float:

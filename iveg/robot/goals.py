@@ -1,17 +1,17 @@
-"""Goals on the robot: what it was told to drive to, until anything holds it.
+"""Goals on the robot: the place that iVeg sent it to, until anything holds it.
 
 ::
 
     none ──set, while it runs──> driving ──near and at rest──> there
     driving, there ──a hold, cancelled, replaced──> none
 
-A goal has no say in what the gate lets through: it only tells navigation where to go,
+A goal has no effect on the gate: it only tells navigation where to go,
 and every hold makes the robot forget it.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field, TypeAdapter, ValidationError
 
@@ -24,10 +24,12 @@ from iveg.ngsi import names
 from iveg.ngsi.codec import load_json
 
 Navigate = Callable[[Goal | None], bool]
-"""Takes a goal, or None to give it up; whether it knows a way there."""
+"""Takes a goal, or None to give it up; returns whether it knows a way there."""
 
 NEAR_M = 0.5
+"""Distance from the place at which a robot at rest has reached it (m)."""
 _REMEMBERED = 64
+"""Answers that are kept for further copies of their orders."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +38,7 @@ class Facts:
 
     Attributes:
         runs: It may drive: no hold, and resumed.
-        challenge: As reported: every hold and resume makes another.
+        challenge: As reported; it changes with every hold and resume.
         own_s: Its monotonic clock (s).
         pose: In ``map``; None while it does not know.
         stands: Whether it is measured to stand.
@@ -54,15 +56,14 @@ class RobotGoals:
 
     Args:
         robot_id: This robot.
-        navigate: Its navigation; None: nobody drives it anywhere.
+        navigate: Its navigation; None: it has none and refuses every goal.
 
     Attributes:
-        goal: Where it is to be; None: wherever its own work takes it.
+        goal: Place that it is to reach; None: it goes on with its own work.
     """
 
     def __init__(self, robot_id: str, navigate: Navigate | None = None) -> None:
-        self._id = robot_id
-        self._navigate = navigate
+        self._id, self._navigate = robot_id, navigate
         self.goal: Goal | None = None
         self._is_there = False
         self._judged: dict[str, GoalAnswer] = {}
@@ -74,16 +75,16 @@ class RobotGoals:
         goal_id = order.goal.goal_id
         if goal_id in self._judged:
             return [self._judged[goal_id]]
-        why = self._why_not(order, facts)
-        answers = [] if why else self._drop("replaced")
-        if why is None and not (self._navigate and self._navigate(order.goal)):
-            why = "no_way"
-        if why is None:
+        reason = self._why_not(order, facts)
+        answers = [] if reason else self._drop("replaced")
+        if reason is None and not (self._navigate and self._navigate(order.goal)):
+            reason = "no_way"
+        if reason is None:
             self.goal, self._is_there = order.goal, False
-        return [*answers, self._judge(goal_id, why)]
+        return [*answers, self._judge(goal_id, reason)]
 
     def settle(self, facts: Facts) -> list[GoalAnswer]:
-        """Forget the goal of a robot that is held; note when it is there."""
+        """Forget the goal of a robot that is held; note when it is reached."""
         goal = self.goal
         if goal is None:
             return []
@@ -116,7 +117,7 @@ class RobotGoals:
         return [self._answer(goal_id, "DROPPED", "cancelled")]
 
     def _drop(self, why: str) -> list[GoalAnswer]:
-        """Forget the goal; navigation is told before anybody else."""
+        """Forget the goal; navigation learns of it before iVeg does."""
         goal, self.goal = self.goal, None
         if goal is None:
             return []
@@ -125,9 +126,7 @@ class RobotGoals:
         return [self._answer(goal.goal_id, "DROPPED", why)]
 
     def _judge(self, goal_id: str, why: str | None) -> GoalAnswer:
-        result: Literal["ACCEPTED", "REFUSED"] = (
-            "ACCEPTED" if why is None else "REFUSED"
-        )
+        result = "ACCEPTED" if why is None else "REFUSED"
         self._judged[goal_id] = self._answer(goal_id, result, why)
         while len(self._judged) > _REMEMBERED:
             del self._judged[next(iter(self._judged))]
@@ -169,8 +168,9 @@ def read_goal(payload: bytes) -> GoalOrder | CancelOrder | None:
     """Read a message of ``/{apikey}/{robot}/cmd`` that is about a goal.
 
     Returns:
-        None for anything else, and for whatever might be a STOP.
+        None for any other message, and for one that might be a STOP.
     """
+    # A STOP goes to the safety machine, whatever else the message may mean.
     if b"stop" in payload.lower():
         return None
     try:
@@ -182,7 +182,5 @@ def read_goal(payload: bytes) -> GoalOrder | CancelOrder | None:
         return None
     if isinstance(order, _Cancel):
         return CancelOrder(order.cancel.id)
-    given = order.set
-    return GoalOrder(
-        Goal(given.id, given.kind, given.x, given.y), given.ch, given.until
-    )
+    goal = order.set
+    return GoalOrder(Goal(goal.id, goal.kind, goal.x, goal.y), goal.ch, goal.until)

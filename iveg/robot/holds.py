@@ -23,6 +23,7 @@ RELEASED_KEPT = 64
 MAX_HOLDS = 48
 """A report may carry 64; the others are reserved for local holds."""
 
+# A boot hold is made anew at each start; a link hold where iVeg is still silent.
 _SURVIVES_REBOOT = frozenset({"iveg", "hw", "bumper"})
 
 
@@ -31,10 +32,10 @@ class HoldSet:
     """The holds of one robot.
 
     Attributes:
-        holds: In the order they came.
+        holds: Those of a report, in the order in which they came.
         released: The last 64 released ids, newest last.
-        joined: STOPs that hold through those in ``holds``, for which there was no more
-            room: the oldest, so that whoever asks can read his own name in a report.
+        joined: STOPs in force beyond the room of a report.  They are the oldest, so
+            that the report names the newest STOP to the person who pressed it.
     """
 
     holds: tuple[Hold, ...] = ()
@@ -42,7 +43,7 @@ class HoldSet:
     joined: tuple[str, ...] = ()
 
     def find(self, hold_id: str) -> Hold | None:
-        """The hold of that name, if it holds now."""
+        """The hold with this id; None when it is not in force."""
         return next((hold for hold in self.holds if hold.id == hold_id), None)
 
     @property
@@ -53,9 +54,8 @@ class HoldSet:
     @property
     def link_alone(self) -> Hold | None:
         """The ``link`` hold that may clear itself; None when there are other holds."""
-        if len(self.holds) == 1 and self.holds[0].ack == "auto":
-            return self.holds[0]
-        return None
+        is_link = [hold.ack for hold in self.holds] == ["auto"]
+        return self.holds[0] if is_link else None
 
     def latch(self, hold: Hold) -> "HoldSet":
         """Add a hold; a ``link`` hold beside others no longer clears itself."""
@@ -68,13 +68,14 @@ class HoldSet:
 
     def _with_room(self) -> "HoldSet":
         """Keep the set within the size of a report: the oldest STOP joins another."""
-        ours = [hold for hold in self.holds if hold.source == "iveg"]
-        if len(self.holds) <= MAX_HOLDS or len(ours) < 2:
+        stops = [hold for hold in self.holds if hold.source == "iveg"]
+        # The last STOP stays: joined STOPs end with it.
+        if len(self.holds) <= MAX_HOLDS or len(stops) < 2:
             return self
         return replace(
             self,
-            holds=tuple(hold for hold in self.holds if hold is not ours[0]),
-            joined=(*self.joined, ours[0].id)[-RELEASED_KEPT:],
+            holds=tuple(hold for hold in self.holds if hold is not stops[0]),
+            joined=(*self.joined, stops[0].id)[-RELEASED_KEPT:],
         )
 
     def lift(self, ids: Iterable[str]) -> "HoldSet":
@@ -84,16 +85,16 @@ class HoldSet:
         """
         named = frozenset(ids)
         lifted = [hold.id for hold in self.holds if hold.id in named]
-        kept = tuple(hold for hold in self.holds if hold.id not in named)
-        held = any(hold.source == "iveg" for hold in kept)
-        gone = () if held else self.joined
-        released = (*self.released, *gone, *lifted)[-RELEASED_KEPT:]
-        return HoldSet(kept, released, self.joined if held else ())
+        remaining = tuple(hold for hold in self.holds if hold.id not in named)
+        has_stop = any(hold.source == "iveg" for hold in remaining)
+        joined_stops = () if has_stop else self.joined
+        released = (*self.released, *joined_stops, *lifted)[-RELEASED_KEPT:]
+        return HoldSet(remaining, released, self.joined if has_stop else ())
 
     def after_reboot(self) -> "HoldSet":
         """The set that a new start inherits: STOPs and local holds, no boot hold."""
-        kept = tuple(hold for hold in self.holds if hold.source in _SURVIVES_REBOOT)
-        return replace(self, holds=kept)
+        lasting = tuple(hold for hold in self.holds if hold.source in _SURVIVES_REBOOT)
+        return replace(self, holds=lasting)
 
 
 # --- hold file --------------------------------------------------------------------
@@ -101,7 +102,7 @@ class HoldSet:
 # The robot's hold set on disk, written atomically.
 #
 # The file is written under another name, flushed and renamed, so a loss of power leaves
-# the old set or the new one.  An unreadable file is not treated as an empty set.
+# the old set or the new one.  An unreadable file counts as a STOP, not as an empty set.
 
 
 class _StoredHolds(BaseModel):
@@ -116,7 +117,7 @@ def read_holds(file: Path) -> HoldSet | None:
     """The stored set; an empty one before the first start; None when unreadable."""
     try:
         stored = _StoredHolds.model_validate(load_json(file.read_bytes()))
-    except FileNotFoundError:
+    except FileNotFoundError:  # before the first start
         return HoldSet()
     except (OSError, UnreadableError, ValidationError):
         return None
@@ -127,7 +128,7 @@ def write_holds(file: Path, holds: HoldSet) -> None:
     """Store the set; on return it survives a loss of power.
 
     Raises:
-        OSError: the disk refused; the file is as it was.
+        OSError: it cannot be written; the file is as it was.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
     write_bytes(file, orjson.dumps(holds))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from iveg.domain.feedback import HALF_SPEED, Feedback
-from iveg.domain.fleet import CAUTIOUS
+from iveg.domain.fleet import CAUTIOUS, RobotProfile
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.motion import MotionTrack
@@ -21,31 +21,24 @@ from iveg.robot.gate import FREE, AppliedCap, Cap, Lookahead, lowest
 
 OnLinkLoss = Literal["stop", "slow"]
 
-_UNDESCRIBED = Outline()
-
 
 @dataclass(frozen=True, slots=True)
 class Limits:
     """Constants of one robot for the safety machine.
 
     Attributes:
-        max_speed: (m/s); ``max_turn`` (rad/s).
+        profile: Its body, and speeds and brakes of its drive.
         slow_s: Feedback older than this halves the speed (s).
         stand_s: Feedback older than this holds the robot (s).
         on_link_loss: ``slow`` stays at half speed however long the silence is.
-        outline: The robot's body.
-        plan: What stands in the greenhouse; None: nobody drew it.
-        braking: What its brakes can do (m/s²).
+        plan: Drawn objects of the greenhouse; None: there is no drawing.
     """
 
-    max_speed: float = 1.0
-    max_turn: float = 1.0
+    profile: RobotProfile = CAUTIOUS
     slow_s: float = LIMITS.feedback_slow_s
     stand_s: float = LIMITS.feedback_stand_s
     on_link_loss: OnLinkLoss = "stop"
-    outline: Outline = _UNDESCRIBED
     plan: Plan | None = None
-    braking: float = CAUTIOUS.braking
 
 
 DEFAULT_LIMITS = Limits()
@@ -53,7 +46,13 @@ DEFAULT_LIMITS = Limits()
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """Newest odometry; ``at`` monotonic (s); ``pose`` None: not in ``map``."""
+    """Newest odometry.
+
+    Attributes:
+        pose: In ``map`` (m, rad); None: not localised.
+        twist: Measured (m/s, rad/s).
+        at: When it came (monotonic, s).
+    """
 
     pose: Pose2D | None
     twist: Twist2D
@@ -70,13 +69,13 @@ class Judgement:
     """
 
     def __init__(self, robot_id: str, boot_at: float, limits: Limits) -> None:
-        self._id = robot_id
-        self._limits = limits
+        self._id, self._limits = robot_id, limits
         self.authors = Authors(robot_id, limits.slow_s)
         self._motion: Placed | None = None
         self._track = MotionTrack()
-        self._witness = Witness(limits.outline, limits.plan)
-        self._lookahead = Lookahead(limits.braking)
+        profile = limits.profile
+        self._laser = Witness(Outline(profile.length, profile.width), limits.plan)
+        self._lookahead = Lookahead(profile.braking)
         self._waited = AppliedCap(Cap(0.0, "watchdog"))
         self.cap = self._waited.cap
         """In force since the last ``settle``."""
@@ -113,32 +112,34 @@ class Judgement:
 
     def note_feedback(self, topic: str, feedback: Feedback, now: float) -> None:
         """Note a message of ``/{topic}/mqtt_feedback``."""
-        seen = feedback.seen.get(self._id)
-        seen_at = self.watchdog.sent_at(seen)
+        seq = feedback.seen.get(self._id)
+        seen_at = self.watchdog.sent_at(seq)
+        # R9: a copy is no evidence that the link works now.
         if self.authors.apply(topic, feedback, self.pose(now), seen_at, now):
-            self.watchdog.heard(seen, now)
+            self.watchdog.received(seq, now)
 
     def note_scan(self, scan: LaserScan, now: float) -> None:
-        """Note what the laser sees; nothing of it without a young pose."""
+        """Note a sweep of the laser; without a fresh pose it is ignored."""
         motion = self.motion(now)
         if motion is not None and motion.pose is not None:
-            known = self.authors.peers(now)
-            self._witness.look(scan, motion.pose, motion.twist, known, now)
+            peers = self.authors.peers(now)
+            self._laser.look(scan, motion.pose, motion.twist, peers, now)
 
     def note_path(self, path: Sequence[tuple[float, float]], now: float) -> None:
-        """Note where the robot's own navigation will drive, in ``map`` (m)."""
+        """Note the path of the robot's own navigation, in ``map`` (m)."""
         self._lookahead.note_path(path, now)
 
     def obstacle(self, now: float) -> ReportedObstacle | None:
-        """Obstacles of the laser that nothing explains, whoever walks first."""
-        seen = self._witness.obstacle(now)
-        if seen is None:
+        """Obstacle of the laser, walking obstacles first; None: there is none."""
+        obstacle = self._laser.obstacle(now)
+        if obstacle is None:
             return None
-        return ReportedObstacle(*seen.place, seen.size_m, seen.walked)
+        return ReportedObstacle(*obstacle.place, obstacle.size_m, obstacle.walked)
 
     def settle(self, now: float) -> None:
-        """Evaluate this moment."""
+        """Evaluate this moment: the lowest of all caps applies (R6)."""
         self.watchdog.tick(now)
+        # Noise of poses at the edge of a zone must not switch the cap on and off.
         slowed = self.cap.reason in ("person", "robot")
         peer_caps = [*self.authors.caps(self.pose(now), slowed, now)]
         raw = lowest(
@@ -146,14 +147,15 @@ class Judgement:
                 self.local,
                 self._pose_cap(now),
                 self._silence_cap(now),
-                self._obstacle_cap(now),
+                FREE if self.obstacle(now) is None else Cap(HALF_SPEED, "obstacle"),
                 self._foreseen_cap(now),
                 *(cap for cap in peer_caps if cap.waits),
             )
         )
         self._waited = self._waited.settle(raw, now)
-        ends_late = (cap for cap in peer_caps if not cap.waits)
-        self.cap = lowest((self._waited.cap, *ends_late))
+        # Their second runs while they still apply, so they end without another.
+        ending = (cap for cap in peer_caps if not cap.waits)
+        self.cap = lowest((self._waited.cap, *ending))
 
     def must_stand(self, now: float) -> bool:
         """Whether iVeg's silence requires a hold."""
@@ -161,32 +163,32 @@ class Judgement:
         return silent and self._limits.on_link_loss == "stop"
 
     def pose(self, now: float) -> Pose2D | None:
-        """Pose in ``map`` of fresh odometry; None without."""
+        """Pose in ``map`` of fresh odometry (m, rad); None without."""
         motion = self.motion(now)
         return None if motion is None else motion.pose
 
     def _pose_cap(self, now: float) -> Cap:
         motion = self.motion(now)
         if motion is None or motion.pose is None:
+            # Without a pose no distance to anybody can be judged.
             return Cap(0.0, "stale")
         return (
             Cap(HALF_SPEED, "stale") if now - motion.at > LIMITS.pose_slow_s else FREE
         )
-
-    def _obstacle_cap(self, now: float) -> Cap:
-        return FREE if self.obstacle(now) is None else Cap(HALF_SPEED, "obstacle")
 
     def _foreseen_cap(self, now: float) -> Cap:
         motion = self.motion(now)
         if motion is None or motion.pose is None:
             self._lookahead.forget()
         elif self._lookahead.is_due(now):
-            ahead = list(self.authors.ahead(now))
-            goes_on = self._track.motion.ahead(motion.pose, motion.twist)
-            self._lookahead.look(*goes_on, ahead, now)
+            zones = list(self.authors.capped_zones(now))
+            # At the speed of the poses where that is higher: a twist hides a slide.
+            pose, twist = self._track.motion.ahead(motion.pose, motion.twist)
+            self._lookahead.look(pose, twist, zones, now)
         return self._lookahead.cap
 
     def _silence_cap(self, now: float) -> Cap:
+        # R7: silence is no permission, unlike in the paper's Algorithm 3.
         age = self.watchdog.age(now)
         if age is not None and age <= self._limits.slow_s:
             return FREE

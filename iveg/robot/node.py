@@ -15,13 +15,10 @@ from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import UnreadableError
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import REST, Twist2D
-from iveg.domain.goals import Goal
-from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
     CommandAnswer,
     FeedbackRef,
     GoalAnswer,
-    Hold,
     Instant,
     LaserScan,
     Navigation,
@@ -31,25 +28,24 @@ from iveg.domain.observations import (
     SafetyReport,
     Unplaced,
 )
-from iveg.domain.witness import Outline, Plan
 from iveg.ngsi import names
 from iveg.ngsi.codec import read_feedback
 from iveg.robot.gate import FREE, Cap
 from iveg.robot.goals import Facts, Navigate, RobotGoals, read_goal
 from iveg.robot.holds import read_holds, write_holds
-from iveg.robot.judgement import Limits, OnLinkLoss
+from iveg.robot.judgement import DEFAULT_LIMITS, Limits
 from iveg.robot.orders import Drive, Effect, Persist, Report, SendAnswer
-from iveg.robot.safety import SafetyMachine, State
-from iveg.robot.uplink import Origins, SafetyLane, Uplink
+from iveg.robot.safety import SafetyMachine
+from iveg.robot.uplink import SafetyLane, Sender, Uplink
 
 # --- pacing -----------------------------------------------------------------------
 #
 # Periodic calls.
 
 SLOTS = 3
-"""A robot's period has one each for drive and odometry, laser, camera."""
+"""Slots of a robot's period: drive and odometry, laser, camera."""
 LONGEST_STEP_S = 0.1
-"""Longest time step (s), so that a suspended machine moves no robot by a jump."""
+"""Longest time step (s): a computer that was suspended moves no robot by a jump."""
 
 
 async def every(period: float, work: Callable[[float], None]) -> None:
@@ -82,13 +78,10 @@ class NodeSettings:
     Attributes:
         address: The broker.
         apikey: First part of the measure topics.
-        directory: Where the holds of each robot survive a loss of power.
-        slow_s: Feedback older than this halves the speed (s).
-        stand_s: Feedback older than this stops the robot (s).
-        on_link_loss: ``slow``: it goes on at half speed instead.
-        plan: What stands in the greenhouse; None: nobody drew it.
-        replay: It plays a recording, which is in this map frame: its messages are
-            marked, and echo no feedback, since their content was measured long ago.
+        directory: Folder of the hold files, which survive a loss of power.
+        limits: Waiting times and the plan; the profile is each robot's own.
+        replay: Map frame of the recording that is played; None: a real robot.  Its
+            messages are marked, and echo no feedback: they were measured long ago.
         read_clock: The robot's own clocks.
         open_link: Opens its link to the broker.
     """
@@ -96,10 +89,7 @@ class NodeSettings:
     address: BrokerAddress
     apikey: str
     directory: Path
-    slow_s: float = LIMITS.feedback_slow_s
-    stand_s: float = LIMITS.feedback_stand_s
-    on_link_loss: OnLinkLoss = "stop"
-    plan: Plan | None = None
+    limits: Limits = DEFAULT_LIMITS
     replay: str | None = None
     read_clock: Callable[[], Instant] = clock.now
     open_link: Callable[[BrokerAddress, str], MqttLink] = MqttLink
@@ -110,11 +100,11 @@ class NodeSettings:
 # Safety software of one robot: executes the effects of the safety machine.
 #
 # It is the only publisher to the drive. Effects are executed where they arise, the zero
-# command first; disk and broker have a queue of their own and are never waited for.
+# command first (R5); disk and broker have queues of their own and are never waited for.
 
 _log = logging.getLogger(__name__)
 _GATE_EVERY_S = 0.04
-"""25 Hz, so that a late timer still gives the drive its 20."""
+"""25 Hz, so that a late timer still gives the drive 20 commands a second."""
 
 
 class RobotNode:
@@ -124,13 +114,14 @@ class RobotNode:
         robot_id: This robot.
         settings: Its broker, files and waiting times.
         profile: Its body, and speeds of the drive.
-        drive: Takes what the gate lets through; must not block.
+        drive: Takes the gate's commands; must not block.
         navigate: Takes goals of iVeg; None: the robot takes none.
 
     Attributes:
         machine: Its safety machine, for reading.
+        goals: Its goal and answers to goals, for reading.
         faults: Data faults that the next reports carry.
-        asks_for_scans: Whether they ask iVeg for scans of peers.
+        asks_for_scans: Whether the reports ask iVeg for scans of peers.
     """
 
     def __init__(
@@ -148,7 +139,7 @@ class RobotNode:
         self._on_peer_scan: Callable[[str, bytes], None] | None = None
         self.asks_for_scans = False
         self.faults: tuple[RobotFault, ...] = ()
-        self._goals = RobotGoals(robot_id, navigate)
+        self.goals = RobotGoals(robot_id, navigate)
         self._command_topic = names.command_topic(settings.apikey, robot_id)
         self._desired_topic = names.DESIRED_TOPIC.format(robot_id=robot_id)
         self._is_replay = settings.replay is not None
@@ -158,33 +149,29 @@ class RobotNode:
         self._lane = SafetyLane(
             partial(write_holds, hold_file), partial(self._link.publish, qos=1)
         )
+        # R2: a STOP from before the restart is in force before anything can move.
         stored = read_holds(hold_file)
         if stored is None:
             _log.warning("%s: unreadable hold file, held: %s", robot_id, hold_file)
         boot = secrets.token_hex(4)
-        origins = Origins(
-            boot,
-            1 + secrets.randbelow(2**31),
-            echoes=None if self._is_replay else self._echoes,
-            replay=settings.replay,
+        self._uplink = Uplink(
+            Sender(
+                robot_id,
+                settings.apikey,
+                boot,
+                first_report=1 + secrets.randbelow(2**31),
+                replay=settings.replay,
+            ),
+            self._link.enqueue,
+            None if self._is_replay else self._echoes,
         )
-        self._uplink = Uplink(robot_id, settings.apikey, origins, self._link.enqueue)
         self.machine = SafetyMachine(
             robot_id,
             boot,
             self._started,
             stored=stored,
             fresh=partial(secrets.token_hex, 8),
-            limits=Limits(
-                profile.max_speed,
-                profile.max_turn,
-                settings.slow_s,
-                settings.stand_s,
-                settings.on_link_loss,
-                Outline(profile.length, profile.width),
-                settings.plan,
-                profile.braking,
-            ),
+            limits=replace(settings.limits, profile=profile),
         )
 
     def _subscribe(self, **more: int) -> None:
@@ -192,44 +179,9 @@ class RobotNode:
         topics = dict.fromkeys(own, 1) | more
         self._link.attach(topics, self._on_message, on_stored=self._on_stored)
 
-    def _echoes(self) -> tuple[FeedbackRef, ...]:
-        return self.machine.authors.echoes(self._read_clock().mono)
-
-    # --- state for upstream -------------------------------------------------------
-
-    @property
-    def state(self) -> State:
-        """State of the safety machine."""
-        return self.machine.state(self._read_clock().mono)
-
-    @property
-    def holds(self) -> tuple[Hold, ...]:
-        """Holds of the robot."""
-        return self.machine.holds.holds
-
-    @property
-    def may_drive(self) -> bool:
-        """Whether upstream twists have effect; if not, upstream should request zero.
-
-        After a resume the robot moves only once upstream has requested zero, or sent no
-        twist at all, for 0.5 s.
-        """
-        return self.machine.may_drive
-
-    @property
-    def goal(self) -> Goal | None:
-        """Where it was sent; None: wherever its own work takes it."""
-        return self._goals.goal
-
-    @property
-    def speed_factor(self) -> float:
-        """Speed factor of the gate, holds excepted."""
-        return self.machine.cap.factor
-
-    @property
-    def connected(self) -> bool:
-        """Whether the broker is connected."""
-        return self._link.connected
+    def _echoes(self, at: float) -> tuple[FeedbackRef, ...]:
+        """Feedback that had come by a moment (s since boot)."""
+        return self.machine.authors.echoes(self._started + at)
 
     # --- inputs -------------------------------------------------------------------
 
@@ -245,30 +197,31 @@ class RobotNode:
                 ):
                     tasks.create_task(work, name=f"robot-{self._id}-{name}")
         finally:
+            # Else the base would follow the last twist until its own time-out.
             self._drive(REST)
 
-    def sense(self, *observations: Observation) -> None:
-        """Take observations of the robot's own sensors; origins are filled in."""
+    def sense(self, *observations: Observation, age_s: float = 0.0) -> None:
+        """Take observations of the robot's own sensors, measured ``age_s`` ago (s).
+
+        Origins are filled in.
+        """
         now = self._read_clock()
         mono = now.mono
         for observation in observations:
-            if isinstance(observation, Odometry):
-                self._perform(
-                    self.machine.odometry(observation.pose, observation.twist, mono),
-                    mono,
-                )
-            elif isinstance(observation, LaserScan) and not self._is_replay:
-                self._perform(self.machine.scan(observation, mono), mono)
-            elif isinstance(observation, Navigation):
-                self.machine.note_path(observation.path, mono)
-            elif isinstance(observation, Unplaced) and observation.twist is not None:
-                self._perform(
-                    self.machine.odometry(None, observation.twist, mono), mono
-                )
+            match observation:
+                case Odometry(pose=pose, twist=twist):
+                    self._perform(self.machine.odometry(pose, twist, mono), mono)
+                case Unplaced(twist=Twist2D() as twist):
+                    self._perform(self.machine.odometry(None, twist, mono), mono)
+                # A recorded laser saw the people of then, not those of now.
+                case LaserScan() if not self._is_replay:
+                    self._perform(self.machine.scan(observation, mono), mono)
+                case Navigation(path=path):
+                    self.machine.note_path(path, mono)
         if self._link.connected:
             own = self._own(now)
             for observation in observations:
-                self._uplink.send(observation, own)
+                self._uplink.send(observation, own, age_s)
 
     def request_twist(self, twist: Twist2D) -> None:
         """Take upstream navigation's ``cmd_vel``; it expires after 0.5 s."""
@@ -282,9 +235,9 @@ class RobotNode:
         """
         self.machine.limit(FREE if factor >= 1.0 else Cap(factor, "stale", cause))
 
-    def hear_peer_scans(self, on_scan: Callable[[str, bytes], None]) -> None:
-        """Hand on scans of peers as they come, by topic; call it before ``run``."""
-        self._on_peer_scan = on_scan
+    def on_peer_scan(self, take: Callable[[str, bytes], None]) -> None:
+        """Pass topic and payload of peers' scans to ``take``; call before ``run``."""
+        self._on_peer_scan = take
         self._subscribe(**{names.PEER_SCAN_FILTER: 0})
 
     def add_local_hold(self, source: Literal["hw", "bumper"]) -> None:
@@ -308,9 +261,9 @@ class RobotNode:
             if order is None:
                 self._perform(self.machine.command(payload, now), now)
             else:
-                # First what the machine knows by now: the link may have just been lost.
+                # First: a link that is lost by now must hold the robot before a goal.
                 self._perform(self.machine.tick(now), now)
-                self._answer(*self._goals.answer(order, self._facts(now)))
+                self._answer(*self.goals.answer(order, self._facts(now)))
         elif topic == self._desired_topic:
             self._perform(self.machine.desired(payload, now), now)
         elif self._on_peer_scan is not None and topic.endswith(names.PEER_SCAN_END):
@@ -319,7 +272,7 @@ class RobotNode:
             self._on_feedback(topic, payload, now)
 
     def _on_stored(self, topic: str, payload: bytes) -> None:
-        """Take orders that the broker retained; feedback of the past is none."""
+        """Take retained orders; retained feedback is old and counts as none."""
         if topic in (self._command_topic, self._desired_topic):
             self._on_message(topic, payload)
 
@@ -327,7 +280,7 @@ class RobotNode:
         try:
             feedback = read_feedback(payload)
         except UnreadableError:
-            return  # Counts as no feedback: the watchdog does the rest.
+            return  # R7: an unreadable message counts as silence for the watchdog.
         peer = topic.removeprefix("/").partition("/")[0]
         self._perform(self.machine.feedback(peer, feedback, now), now)
         self._uplink.rates.note_backlog(self.machine.authors.backlog_s(), now)
@@ -345,8 +298,9 @@ class RobotNode:
                     self._answer(answer)
                 case Report(report, is_measure):
                     self._report(report, is_measure=is_measure)
-        if self._goals.goal is not None:
-            self._answer(*self._goals.settle(self._facts(now)))
+        # After the effects: a hold of this very call deletes the goal.
+        if self.goals.goal is not None:
+            self._answer(*self.goals.settle(self._facts(now)))
 
     def _facts(self, now: float) -> Facts:
         return Facts(
@@ -360,7 +314,7 @@ class RobotNode:
     def _answer(self, *answers: CommandAnswer | GoalAnswer) -> None:
         for answer in answers:
             words = self._id, answer.result, answer.id or "", answer.why or ""
-            _log.info("%s: %s %s %s", *words)
+            _log.info("%s: answers %s %s %s", *words)
             own = self._own(self._read_clock())
             self._lane.answer(self._uplink.answer(answer, own))
 

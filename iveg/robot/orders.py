@@ -1,4 +1,4 @@
-"""Orders to the safety machine, the effects that it asks for, and its answers."""
+"""Orders to the safety machine, its effects, and its answers."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -22,17 +22,18 @@ from iveg.robot.holds import HoldSet
 
 _STOP = "stop"
 _MAX_NAMED = 128
+"""Most ids in one order; a report never has so many holds."""
 
 
 @dataclass(frozen=True, slots=True)
 class StopOrder:
-    """Halt and hold; ``id`` None when the sender gave no usable name."""
+    """Halt and hold; ``id`` None when the sender gave no usable id."""
 
     id: str | None = None
 
 
 def _refuse_unusable(text: str) -> str:
-    """The id of an order, or its answer could not be sent."""
+    """Refuse an id that the answer to the order could not carry."""
     if _usable_id(text) is None:
         raise ValueError("not an id")
     return text
@@ -83,11 +84,12 @@ def read_order(payload: bytes) -> Order:
     try:
         message = load_json(payload)
     except UnreadableError:
+        # A STOP that was cut off or damaged on its way must still halt the robot.
         return (
             StopOrder() if _STOP.encode() in payload.lower() else Unusable("unreadable")
         )
     # JSON drops the first of two equal keys, so the bytes are searched as well.
-    if b'"stop"' in payload.lower() or _speaks_of_stop(message):
+    if b'"stop"' in payload.lower() or _mentions_stop(message):
         return StopOrder(_stop_id(message))
     return _release_or_resume(message)
 
@@ -96,7 +98,7 @@ def read_desired_state(payload: bytes) -> tuple[str, ...] | None:
     """Read ``/{robot}/iveg/desired``.
 
     Returns:
-        The STOPs that hold (empty: one without an id); None where nothing holds.
+        Ids of the STOPs in force (empty: a STOP without an id); None: there is none.
     """
     try:
         level = load_json(payload)
@@ -109,13 +111,13 @@ def read_desired_state(payload: bytes) -> tuple[str, ...] | None:
     return tuple(name for name in usable[:_MAX_NAMED] if name is not None)
 
 
-def _speaks_of_stop(value: object) -> bool:
+def _mentions_stop(value: object) -> bool:
     if isinstance(value, str):
         return value.strip().casefold() == _STOP
     if isinstance(value, list):
-        return any(_speaks_of_stop(part) for part in value)
+        return any(_mentions_stop(part) for part in value)
     if isinstance(value, dict):
-        return any(_speaks_of_stop(part) for pair in value.items() for part in pair)
+        return any(_mentions_stop(part) for pair in value.items() for part in pair)
     return False
 
 
@@ -129,6 +131,7 @@ def _member(value: object, name: str) -> object:
 
 
 def _usable_id(value: object) -> str | None:
+    # Orion refuses these characters, so a report that names the hold would not arrive.
     if not isinstance(value, str) or not value or wire.FORBIDDEN & set(value):
         return None
     return value if wire.clean_text(value) == value else None
@@ -136,11 +139,12 @@ def _usable_id(value: object) -> str | None:
 
 def _release_or_resume(message: object) -> Order:
     command = _member(message, names.COMMAND)
+    # Of two orders in a message nobody could say which the sender means.
     if not isinstance(command, dict) or len(command) != 1:
         return Unusable("malformed")
-    ((name, asked),) = command.items()
+    ((name, content),) = command.items()
     try:
-        return _STRICT[name].model_validate(asked)
+        return _STRICT[name].model_validate(content)
     except (KeyError, ValidationError):
         return Unusable("malformed")
 
@@ -199,7 +203,9 @@ Effect = Drive | Persist | SendAnswer | Report
 # changed: a refused order stays refused.
 
 ATTEMPTS_KEPT = 64
-"""The challenge of one that is forgotten is spent, so no copy of it can succeed."""
+"""Attempts whose answer is remembered; the challenge of a forgotten one is spent, so
+that no copy of it can succeed."""
 
 Verdict = tuple[str | None, AnswerCode, str | None]
-"""On a release or resume: the hold that the answer names, and why it was refused."""
+"""Answer to a release or resume: the hold that it names, its code, and the reason of a
+refusal."""

@@ -17,12 +17,14 @@ from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS, grown_radius
 from iveg.domain.motion import MotionTrack
 from iveg.domain.parameters import Class
-from iveg.robot.gate import FREE, Ahead, Cap, known_reason
+from iveg.domain.rule.paths import MovingZone
+from iveg.robot.gate import FREE, Cap, CappedZone, known_reason
 
 MOVED_ON_S = 1.0
+"""An alert that the messages of its topic lack counts this much longer (s)."""
 
 AlertKey = tuple[str, str | None, str | None, int]
-"""Decision, observer, class, and which of those that share them."""
+"""Decision, observer, class, and number among the alerts that share all three."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +32,7 @@ class KeptAlert:
     """One alert as last received.
 
     Attributes:
+        at: When it was received (monotonic, s).
         missing_since: Time of the topic's first message without it; None: present.
         myself: The alert describes this robot.
     """
@@ -53,7 +56,7 @@ class Neighbour:
 
 
 PERSON_M, PEER_M = 0.35, 0.75
-"""Radii of bodies."""
+"""Radii of bodies as navigation and RViz get them (m)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +64,7 @@ class PeerObserver:
     """The observer of a topic at the pose that iVeg reports.
 
     Attributes:
-        stamp: As received; while it stays the same, the pose grows old.
+        stamp: Stamp of the pose; while it does not change, the pose grows old.
         at: When this stamp was first received (monotonic, s).
         speed: Along the pose's heading (m/s).
     """
@@ -81,44 +84,43 @@ class PeerObserver:
             name: The peer's topic.
             own: In ``map``.
             radius_m: Zone of a peer whose pose is fresh (m).
-            beyond: How much farther it counts, of a robot that is slow already (m).
+            beyond: Added to the zone for a robot that is slow already (m).
             now: Monotonic (s).
         """
         age = now - self.at
+        # A peer that stood a second ago may have started since.
         if age > LIMITS.zone_lasts_s or (self.stands and age <= LIMITS.silence_s):
             return FREE
         zone_m = grown_radius(radius_m, age) + beyond
         near = own.distance_to(self.pose.x, self.pose.y) <= zone_m
         return Cap(HALF_SPEED, "robot", name) if near else FREE
 
-    def ahead(self, name: str, radius_m: float, now: float) -> Iterator[Ahead]:
-        """Its zone as it goes on, while its pose is young."""
+    def zone(self, name: str, radius_m: float, now: float) -> Iterator[CappedZone]:
+        """Its moving zone, while its pose is fresh."""
         age, pose = now - self.at, self.pose
         if age <= LIMITS.silence_s:
-            goes = self.speed * math.cos(pose.yaw), self.speed * math.sin(pose.yaw)
-            row = pose.x, pose.y, *goes, age, radius_m
-            yield row, Cap(HALF_SPEED, "robot", name)
+            vx, vy = self.speed * math.cos(pose.yaw), self.speed * math.sin(pose.yaw)
+            zone = MovingZone(pose.x, pose.y, vx, vy, age, radius_m)
+            yield zone, Cap(HALF_SPEED, "robot", name)
 
 
 class RuleRadii:
     """Radii of the rule as iVeg sent them: of each class the largest of the last 10 s.
 
-    So a robot that is told a smaller radius keeps the greater one for as long as a
-    sighting that was made under it has a zone.
+    After a change to a smaller radius the larger one stays for as long as a sighting
+    that was made under it has a zone.
     """
 
     def __init__(self) -> None:
         self._values: dict[Class, list[tuple[float, float]]] = {}
-        """By class: when each came (monotonic, s), and its value (m); largest first."""
+        """Time of arrival (monotonic, s) and radius (m) by class, largest first."""
 
     def note(self, radii: Mapping[Class, float], now: float) -> None:
         """Note the values of a message."""
         for class_, radius_m in radii.items():
             values = self._values.get(class_, [])
             larger = [
-                earlier
-                for earlier in values
-                if earlier[1] > radius_m and _counts(earlier, now)
+                entry for entry in values if entry[1] > radius_m and _counts(entry, now)
             ]
             self._values[class_] = [*larger, (now, radius_m)]
 
@@ -128,7 +130,7 @@ class RuleRadii:
         return bool(self._values)
 
     def fresh_m(self, class_: Class, now: float) -> float:
-        """Radius of a fresh zone of this class (m); by default that of the paper.
+        """Radius of a fresh zone of this class (m); the paper's until iVeg sends one.
 
         The newest value counts until another comes, however old it is.
         """
@@ -136,12 +138,12 @@ class RuleRadii:
         if not values:
             return LIMITS.zone_default_m
         return next(
-            (earlier[1] for earlier in values if _counts(earlier, now)), values[-1][1]
+            (entry[1] for entry in values if _counts(entry, now)), values[-1][1]
         )
 
 
-def _counts(value: tuple[float, float], now: float) -> bool:
-    return now - value[0] <= LIMITS.zone_lasts_s
+def _counts(entry: tuple[float, float], now: float) -> bool:
+    return now - entry[0] <= LIMITS.zone_lasts_s
 
 
 @dataclass(slots=True)
@@ -159,8 +161,9 @@ class PeerTopic:
 
 def is_alive(kept: KeptAlert, topic: PeerTopic, now: float) -> bool:
     """Whether an alert still counts: recent, and not superseded on its topic."""
-    missing = kept.missing_since
-    moved_on = missing is not None and topic.at - missing >= MOVED_ON_S
+    since = kept.missing_since
+    # Against the topic's newest message, so that silence ends no alert early.
+    moved_on = since is not None and topic.at - since >= MOVED_ON_S
     return not moved_on and now - kept.at <= LIMITS.zone_lasts_s
 
 
@@ -169,14 +172,14 @@ def alerts_of(feedback: Feedback) -> dict[AlertKey, FeedbackAlert]:
     alerts = list(feedback.alerts)
     if feedback.alert is not None and feedback.alert not in alerts:
         alerts.append(feedback.alert)
-    found: dict[AlertKey, FeedbackAlert] = {}
+    by_key: dict[AlertKey, FeedbackAlert] = {}
     counts = Counter[tuple[str, str | None, str]]()
     for alert in alerts:
         if alert.class_ is not None:
             shared = alert.decision_id, alert.observer, alert.class_
-            found[*shared, counts[shared]] = alert
+            by_key[*shared, counts[shared]] = alert
             counts[shared] += 1
-    return found
+    return by_key
 
 
 def limited_free(speed_limit: SpeedLimit, alert: FeedbackAlert) -> bool:
@@ -191,11 +194,12 @@ def limited_free(speed_limit: SpeedLimit, alert: FeedbackAlert) -> bool:
 def zone_radius(
     alert: FeedbackAlert, radii: RuleRadii, silence: float, now: float
 ) -> float:
-    """The radius of an alert after so long a silence, at least the rule's (m)."""
-    told_m = radii.fresh_m(alert.class_ or "person", now)
+    """Radius of an alert's zone (m) after ``silence`` (s); at least the rule's."""
+    fresh_m = radii.fresh_m(alert.class_ or "person", now)
     if alert.radius_m is not None:
-        told_m = max(alert.radius_m, told_m) if radii.is_known else alert.radius_m
-    return grown_radius(told_m, silence)
+        # The paper's default is no lower bound: a rule may ask for less.
+        fresh_m = max(alert.radius_m, fresh_m) if radii.is_known else alert.radius_m
+    return grown_radius(fresh_m, silence)
 
 
 def is_inside(
@@ -204,23 +208,25 @@ def is_inside(
     own: Pose2D | None,
     zone_m: float,
 ) -> bool:
-    """Whether ``own`` is inside the radius, about the observer if no place is known."""
+    """Whether ``own`` is in the zone around the alert's place, else its observer's."""
     if alert.position is not None:
         place = alert.position[:2]
     elif observer is not None:
         place = (observer.pose.x, observer.pose.y)
     else:
         return True
+    # Without either place nobody knows that the robot is outside.
     return own is None or own.distance_to(*place) <= zone_m
 
 
-def alert_ahead(kept: KeptAlert, radii: RuleRadii, now: float) -> Iterator[Ahead]:
-    """The alert as something that the robot may drive into; nothing without a place."""
+def alert_zone(kept: KeptAlert, radii: RuleRadii, now: float) -> Iterator[CappedZone]:
+    """Moving zone of an alert; nothing without a place or velocity."""
     alert = kept.alert
     if alert.position is not None and alert.velocity is not None:
-        (x, y, _), goes = alert.position, alert.velocity
+        # Not grown: after a second of silence the topic has no forecast at all.
         radius_m = zone_radius(alert, radii, 0.0, now)
-        yield (x, y, *goes, now - kept.at, radius_m), alerted(alert)
+        (x, y, _), (vx, vy) = alert.position, alert.velocity
+        yield MovingZone(x, y, vx, vy, now - kept.at, radius_m), alert_cap(alert)
 
 
 def neighbour_of(
@@ -235,7 +241,7 @@ def neighbour_of(
         yield Neighbour(alert.class_, name, x, y, body_m, zone_m)
 
 
-def alerted(alert: FeedbackAlert, *, waits: bool = True) -> Cap:
+def alert_cap(alert: FeedbackAlert, *, waits: bool = True) -> Cap:
     """The cap that an alert asks for."""
     reason = known_reason(alert.class_ or "stale")
     return Cap(HALF_SPEED, reason, None, alert.decision_id or None, waits)

@@ -13,11 +13,12 @@ r"""The safety machine of one robot, pure: facts and times in, frozen effects ou
              feedback was fresh for 2.0 s, three times a minute, if no other hold came
 
 The state is never stored: it follows from the holds, the measured speed and whether
-a resume was accepted.  The paper's Algorithm 3 is in ``peer_feedback``; here silence is
-added, which the paper treats as permission and iVeg does not.
+a resume was accepted.  The paper's Algorithm 3 is ``PeerFeedback`` in ``feedback.py``.
+The paper takes silence for permission; iVeg does not.  R1 to R10 are the invariants of
+docs/safety.md.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Literal
 
 from iveg.domain.feedback import Feedback
@@ -53,9 +54,11 @@ State = Literal["HELD", "BRAKING", "STANDING", "READY", "RUNNING"]
 
 CHALLENGE_LIVES_S = 5.0
 REPORT_EVERY_S, REPORT_HELD_EVERY_S = 0.4, 0.075
-"""Below the contract's 0.5 s and 0.1 s, so that a late timer still keeps them.  The
-second, while held or while somebody walks beside it, is for iVeg alone: ten a second
-would be most of what one agent can carry."""
+"""Periods of the safety report (s); the second while held or near somebody who walks.
+
+Both are below the contract's 0.5 s and 0.1 s, so that a late timer still keeps them.
+The second goes to iVeg alone: ten a second are most of what one agent can carry.
+"""
 
 
 class SafetyMachine:
@@ -69,7 +72,7 @@ class SafetyMachine:
         boot: Random text of this start.
         now: Monotonic (s).
         stored: The hold set of the last run; None when it could not be read, which
-            counts as a STOP whose name was lost.
+            counts as a STOP without an id.
         fresh: Returns a new random text, for challenges and hold ids.
         limits: Speeds and waiting times.
     """
@@ -84,9 +87,8 @@ class SafetyMachine:
         fresh: Callable[[], str],
         limits: Limits = DEFAULT_LIMITS,
     ) -> None:
-        self._id = robot_id
-        self._fresh = fresh
-        self._gate = Gate(limits.max_speed, limits.max_turn)
+        self._id, self._fresh = robot_id, fresh
+        self._gate = Gate(limits.profile.max_speed, limits.profile.max_turn)
         self._judgement = Judgement(robot_id, now, limits)
         self._resumed = False
         self._resumed_by: str | None = None
@@ -94,11 +96,13 @@ class SafetyMachine:
         self._verdicts: dict[str, Verdict] = {}
         self._holds = (stored or HoldSet()).after_reboot()
         self._persisted: HoldSet | None = None
-        self._said: tuple[Cap, HoldSet, str, bool] | None = None
-        """Grounds of the newest report, but speeds and ages: a change is news."""
+        self._reported: tuple[Cap, HoldSet, str, bool] | None = None
+        """Content of the newest report without speeds and ages; a change is news."""
         self._reported_at = self._measured_at = now
         if stored is None:
+            # R2: the file that cannot be read may have held a STOP.
             self._latch(self._nameless_stop(), now)
+        # R4: a robot that crashed beside somebody must not start again by itself.
         self._latch(Hold(f"boot-{boot}", "boot", "remote"), now)
 
     # --- state --------------------------------------------------------------------
@@ -108,6 +112,7 @@ class SafetyMachine:
         if not self._holds.holds:
             return "RUNNING" if self._resumed else "READY"
         if self._judgement.motion(now) is None:
+            # Without fresh odometry neither braking nor standing is measured.
             return "HELD"
         return "STANDING" if self._judgement.stands(now) else "BRAKING"
 
@@ -116,7 +121,7 @@ class SafetyMachine:
         return self._judgement.stands(now)
 
     def pose(self, now: float) -> Pose2D | None:
-        """Where it is in ``map``; None while that is not known, or old."""
+        """Pose in ``map`` (m, rad); None while it is unknown or old."""
         return self._judgement.pose(now)
 
     @property
@@ -131,12 +136,16 @@ class SafetyMachine:
 
     @property
     def authors(self) -> Authors:
-        """Everybody who sends this robot feedback."""
+        """Authors of the feedback that this robot receives."""
         return self._judgement.authors
 
     @property
     def may_drive(self) -> bool:
-        """Whether a twist would move the robot: no holds, and neutral was seen."""
+        """Whether a twist would move the robot: no holds, and neutral was seen.
+
+        If not, upstream should request zero: after a resume the robot moves only once
+        upstream has requested zero, or sent no twist at all, for 0.5 s.
+        """
         return self._free and not self._gate.neutral_needed
 
     @property
@@ -164,7 +173,7 @@ class SafetyMachine:
         return self.tick(now)
 
     def scan(self, scan: LaserScan, now: float) -> tuple[Effect, ...]:
-        """Take a sweep of the robot's own laser, the second witness of people."""
+        """Take a sweep of the robot's own laser, which shows people without iVeg."""
         self._judgement.note_scan(scan, now)
         return self.tick(now)
 
@@ -189,6 +198,7 @@ class SafetyMachine:
 
     def command(self, payload: bytes, now: float) -> tuple[Effect, ...]:
         """Take a message of ``/{apikey}/{robot}/cmd``."""
+        # First: the order is judged by the challenge and standstill of this moment.
         self._judge(now)
         order = read_order(payload)
         if isinstance(order, StopOrder):
@@ -197,6 +207,7 @@ class SafetyMachine:
             answer = self._attempt(order, now)
         else:
             answer = self._answer(None, "REFUSED", order.why)
+        # Again: R7 holds a robot that this order set free during iVeg's silence.
         self._judge(now)
         return self._effects(now, answer)
 
@@ -204,6 +215,7 @@ class SafetyMachine:
         """Take the retained desired state; ``run`` releases nothing."""
         level = read_desired_state(payload)
         if level is not None:
+            # R2: a STOP without an id, an empty list, holds as well.
             for hold_id in level or (None,):
                 self._stop(hold_id, now)
         return self.tick(now)
@@ -212,14 +224,15 @@ class SafetyMachine:
         self, source: Literal["hw", "bumper"], now: float
     ) -> tuple[Effect, ...]:
         """Hold the robot because its red button or bumper was pressed."""
+        # A contact that bounces must not fill the room that a report has for holds.
         if all(hold.source != source for hold in self._holds.holds):
             self._latch(Hold(f"{source}-{self._fresh()}", source, "local"), now)
         return self.tick(now)
 
     def release_locally(self, now: float) -> tuple[Effect, ...]:
-        """Lift the local holds and resume, as the crew at the robot does.
+        """Lift boot, button and bumper holds and resume, for the crew at the robot.
 
-        A STOP from iVeg stays, and with it the robot.
+        A STOP from iVeg stays in force (R2).
         """
         local = {"boot", "hw", "bumper"}
         self._holds = self._holds.lift(
@@ -232,6 +245,7 @@ class SafetyMachine:
     # --- commands -----------------------------------------------------------------
 
     def _stop(self, hold_id: str | None, now: float) -> CommandAnswer:
+        # Ids are never reused, so this is a late copy of a STOP that is over.
         if hold_id in self._holds.released:
             return self._answer(hold_id, "RELEASED")
         hold = self._held_as(hold_id)
@@ -244,18 +258,20 @@ class SafetyMachine:
         held = None if hold_id is None else self._holds.find(hold_id)
         if held is not None and held.ack == "remote":
             return held
+        # R2: a STOP under the id of a local or link hold must outlive that hold.
         if hold_id is None or held is not None:
             return self._nameless_stop()
         return Hold(hold_id, "iveg", "remote")
 
     def _nameless_stop(self) -> Hold:
+        """The hold that all STOPs without a usable id share, so they fill no set."""
         for hold in self._holds.holds:
             if hold.source == "iveg" and hold.id.startswith("local-"):
                 return hold
         return Hold(f"local-{self._fresh()}", "iveg", "remote")
 
     def _attempt(self, order: ReleaseOrder | ResumeOrder, now: float) -> CommandAnswer:
-        """Judge the first copy of an order; give every other the same answer."""
+        """Judge the first copy of an order; answer every other copy alike (R9)."""
         verdict = self._verdicts.get(order.attempt)
         if verdict is None:
             if isinstance(order, ReleaseOrder):
@@ -270,11 +286,12 @@ class SafetyMachine:
     def _release(self, order: ReleaseOrder, now: float) -> Verdict:
         first = order.ids[0]
         if set(order.ids) <= set(self._holds.released):
-            # The same release again: no hold is left to lift; the answer is the same.
+            # A second attempt at a release that succeeded: there is nothing to lift.
             return first, "RELEASED", None
-        why = self._why_not_release(order, now)
-        if why is not None:
-            return self._refuse(first, order.challenge, why, now)
+        reason = self._why_not_release(order, now)
+        if reason is not None:
+            return self._refuse(first, order.challenge, reason, now)
+        # R3, R8: named and remote; a release may name local holds and lifts none.
         self._holds = self._holds.lift(self._holds.remote & frozenset(order.ids))
         self._renew_challenge(now)
         return first, "RELEASED", None
@@ -284,6 +301,7 @@ class SafetyMachine:
         remote = self._holds.remote
         if not remote:
             return "not_held"
+        # R2: the person who released did not see a hold that the order lacks.
         if not remote <= set(order.ids):
             return "holds_missing"
         if order.challenge != self._challenge:
@@ -291,11 +309,12 @@ class SafetyMachine:
         return None if self._judgement.stands(now) else "not_standing"
 
     def _resume(self, order: ResumeOrder, now: float) -> Verdict:
+        # A second attempt at a resume that succeeded: the robot drives already.
         if self._resumed and order.challenge == self._resumed_by:
             return None, "RESUMED", None
-        why = self._why_not_resume(order)
-        if why is not None:
-            return self._refuse(None, order.challenge, why, now)
+        reason = self._why_not_resume(order)
+        if reason is not None:
+            return self._refuse(None, order.challenge, reason, now)
         self._let_go()
         self._resumed_by = order.challenge
         self._renew_challenge(now)
@@ -311,7 +330,7 @@ class SafetyMachine:
     def _refuse(
         self, answered: str | None, challenge: str, why: str, now: float
     ) -> Verdict:
-        """Refuse an order; its challenge is spent, so a later copy cannot succeed."""
+        """Refuse an order and spend its challenge, so that no later copy succeeds."""
         if challenge == self._challenge:
             self._renew_challenge(now)
         return answered, "REFUSED", why
@@ -342,12 +361,13 @@ class SafetyMachine:
         """Evaluate caps, the ``link`` hold and the challenge at this moment."""
         self._judgement.settle(now)
         self._judge_link(now)
-        waited = now - self._challenge_at
-        if not self._free and waited >= CHALLENGE_LIVES_S:
+        # While it drives no order needs a challenge, and a new one would be news.
+        if not self._free and now - self._challenge_at >= CHALLENGE_LIVES_S:
             self._renew_challenge(now)
 
     def _judge_link(self, now: float) -> None:
         watchdog = self._judgement.watchdog
+        # Beside another hold ``link`` waits for a release (docs/safety.md, "Holds").
         link = self._holds.link_alone
         if link is not None and watchdog.steady(now):
             self._holds = self._holds.lift([link.id])
@@ -360,7 +380,9 @@ class SafetyMachine:
 
     def _latch(self, hold: Hold, now: float) -> None:
         self._holds = self._holds.latch(hold)
+        # R2: a release on its way was meant for the earlier holds.
         self._renew_challenge(now)
+        # R10: a lost link alone keeps the resume, so that its hold can lift itself.
         if hold.ack != "auto":
             self._resumed = False
 
@@ -379,28 +401,33 @@ class SafetyMachine:
 
     def _effects(self, now: float, *answers: CommandAnswer) -> tuple[Effect, ...]:
         twist = self._gate.output(self.cap.factor, self._free, now)
+        # R5: zero for the drive goes before anything that may take time.
         effects: list[Effect] = [Drive(twist)]
+        # Before the answer: a hold that was confirmed must outlive a loss of power.
         if self._holds != self._persisted:
             self._persisted = self._holds
             effects.append(Persist(self._holds))
         effects += [SendAnswer(answer) for answer in answers]
+        return *effects, *self._due_report(now)
+
+    def _due_report(self, now: float) -> Iterator[Report]:
+        """The report of a change, or one whose time has come; else nothing."""
         obstacle = self._judgement.obstacle(now)
         walks = obstacle is not None and obstacle.moved
-        applied = self._limit, self._holds, self._challenge, walks
-        is_news = applied != self._said
+        content = self._limit, self._holds, self._challenge, walks
+        is_news = content != self._reported
         is_often = walks or self._holds.holds
-        every = REPORT_HELD_EVERY_S if is_often else REPORT_EVERY_S
-        if is_news or now - self._reported_at >= every:
-            self._said, self._reported_at = applied, now
+        period_s = REPORT_HELD_EVERY_S if is_often else REPORT_EVERY_S
+        if is_news or now - self._reported_at >= period_s:
+            self._reported, self._reported_at = content, now
             is_measure = is_news or now - self._measured_at >= REPORT_EVERY_S
-            if is_measure:  # changes, and two reports a second, also go to the agent
+            if is_measure:  # the agent gets changes and two reports a second, no more
                 self._measured_at = now
-            effects.append(Report(self._report(now), is_measure))
-        return tuple(effects)
+            yield Report(self._report(now), is_measure)
 
     @property
     def _limit(self) -> Cap:
-        """The limit that is applied; a robot that waits for resume says 0, ``hold``."""
+        """The applied limit; a robot that waits for resume reports 0, ``hold``."""
         if self._free:
             return self.cap
         holds = self._holds.holds

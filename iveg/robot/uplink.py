@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
@@ -47,7 +47,7 @@ FLOOR_HZ = dict(
         key=itemgetter(1),
     )
 )
-"""Least rates by device; who can be rarest gives way first."""
+"""Least rates by device (Hz); the device with the lowest gives way first."""
 LEVELS = float(len(FLOOR_HZ))
 
 BEHIND_S, WELL_S = 0.5, 0.25
@@ -56,6 +56,7 @@ FAR_BEHIND_S = 3.0
 RISE_PER_S, RISE_FAR_PER_S, SINK_PER_S = 0.5, 1.0, 0.02
 PATIENCE_S = 10.0
 """Time without a backlog before the level falls (s)."""
+# A backlog that is reported after a long silence counts for this long, not for all.
 _LONGEST_STEP_S = 0.5
 
 
@@ -70,33 +71,33 @@ class UplinkRates:
     """
 
     level: float = 0.0
-    _told_at: float | None = None
+    _noted_at: float | None = None
     _well_since: float | None = None
     _due: dict[str, float] = field(default_factory=dict)
 
     def note_backlog(self, backlog_s: float | None, now: float) -> None:
         """Take Orion's reported lag; None, when unknown, changes nothing."""
-        before, self._told_at = self._told_at, now
+        before, self._noted_at = self._noted_at, now
         if backlog_s is None or before is None:
             return
-        step = min(max(0.0, now - before), _LONGEST_STEP_S)
+        dt = min(max(0.0, now - before), _LONGEST_STEP_S)
         if backlog_s >= BEHIND_S:
-            self._rise(backlog_s, step)
+            self._rise(backlog_s, dt)
         elif backlog_s > WELL_S:
             self._well_since = None
         else:
-            self._sink(now, step)
+            self._sink(now, dt)
 
-    def _rise(self, backlog_s: float, step: float) -> None:
+    def _rise(self, backlog_s: float, dt: float) -> None:
         self._well_since = None
         speed = RISE_FAR_PER_S if backlog_s >= FAR_BEHIND_S else RISE_PER_S
-        self.level = min(LEVELS, self.level + speed * step)
+        self.level = min(LEVELS, self.level + speed * dt)
 
-    def _sink(self, now: float, step: float) -> None:
+    def _sink(self, now: float, dt: float) -> None:
         if self._well_since is None:
             self._well_since = now
         if now - self._well_since >= PATIENCE_S:
-            self.level = max(0.0, self.level - SINK_PER_S * step)
+            self.level = max(0.0, self.level - SINK_PER_S * dt)
 
     def is_measure(self, suffix: str, now: float) -> bool:
         """Whether a device's message goes to the agent."""
@@ -110,14 +111,12 @@ class UplinkRates:
 
     def _interval_s(self, suffix: str) -> float:
         """Least time between two measures of a device (s); 0: every message is one."""
-        if self.level == 0.0:
+        if suffix not in FLOOR_HZ:
             return 0.0
-        for place, (device, floor_hz) in enumerate(FLOOR_HZ.items()):
-            # From the sensor's own rate (0) to its floor (1).
-            share = min(1.0, self.level - place)
-            if device == suffix and share > 0.0:
-                return float((TOP_HZ / floor_hz) ** share / TOP_HZ)
-        return 0.0
+        # From the sensor's own rate (0) to its floor (1).
+        share = min(1.0, self.level - list(FLOOR_HZ).index(suffix))
+        slower = float((TOP_HZ / FLOOR_HZ[suffix]) ** share)
+        return slower / TOP_HZ if share > 0.0 else 0.0
 
 
 # --- lane -------------------------------------------------------------------------
@@ -130,9 +129,8 @@ class UplinkRates:
 _log = logging.getLogger(__name__)
 _MAX_ANSWERS = 256
 _UNDER_WAY = 16
-"""Messages without a confirmation of the broker.  One at a time would be one report a
-second over a radio that takes half a second each way, and no standstill is measured
-from those."""
+"""Most messages that await the broker's confirmation.  With one at a time a radio that
+takes half a second each way carries one report a second, too few for a standstill."""
 
 
 LaneMessage = tuple[str, bytes]
@@ -152,8 +150,7 @@ class SafetyLane:
         keep: Callable[[HoldSet], None],
         publish: Callable[[str, bytes], Awaitable[None]],
     ) -> None:
-        self._keep = keep
-        self._publish = publish
+        self._keep, self._publish = keep, publish
         self._to_keep: HoldSet | None = None
         self._answers: deque[LaneMessage] = deque(maxlen=_MAX_ANSWERS)
         self._kept_answers: deque[LaneMessage] = deque(maxlen=_MAX_ANSWERS)
@@ -217,7 +214,7 @@ class SafetyLane:
         try:
             await self._publish(*message)
         except HopError:
-            pass  # lost without a broker; the next report has the state
+            pass  # lost while the broker is away; the next report has the state
         finally:
             self._room.release()
 
@@ -235,97 +232,75 @@ class SafetyLane:
 _UNPLACED = {"odometry": Odometry, "scan": LaserScan}
 _SAFETY = KIND_OF[SafetyReport].suffix or ""
 _ANSWERS, _GOALS = "cmdexe", "goal"
+_LEAST_APART_S = 1e-4
+"""Least time between two moments of a topic (s): iVeg requires that they rise."""
 
 
-class Origins:
-    """Gives each message of a robot its origin.
+@dataclass(frozen=True, slots=True)
+class Sender:
+    """A start of a robot, as its messages name it.
 
-    Args:
+    Attributes:
+        robot_id: This robot.
+        apikey: First part of its topics.
         boot: Random text of this start.
         first_report: ``seq`` of the first safety report; random, so that a number from
             an earlier boot is not taken for one of this.
-        echoes: Returns the newest feedback of each author, of the one met first at
-            first; None for recordings, which prove no age.
         replay: The map frame of a recording, by which its messages are marked.
     """
 
-    def __init__(
-        self,
-        boot: str,
-        first_report: int = 1,
-        *,
-        echoes: Callable[[], tuple[FeedbackRef, ...]] | None = None,
-        replay: str | None = None,
-    ) -> None:
-        self._boot, self._echoes, self._replay = boot, echoes, replay
-        self._next: Counter[str] = Counter({_SAFETY: first_report - 1})
-
-    def next(self, suffix: str, at: Instant) -> Origin:
-        """Origin of the next message of a topic.
-
-        ``at``: seconds since the robot's boot, and its wall clock.
-        """
-        self._next[suffix] += 1
-        echoes = None if self._echoes is None else self._echoes()
-        return Origin(
-            self._boot,
-            self._next[suffix],
-            codec.format_stamp(at.wall),
-            at.wall,
-            at.mono,
-            acknowledgements=echoes is not None,
-            heard=echoes[0] if echoes else None,
-            heard_also=echoes[1:] if echoes else (),
-            replay=self._replay,
-        )
+    robot_id: str
+    apikey: str
+    boot: str
+    first_report: int = 1
+    replay: str | None = None
 
 
 class Uplink:
-    """Turns observations into messages, each with its place in the count.
+    """Turns observations into messages, each with its boot and ``seq``.
 
     Args:
-        robot_id: This robot.
-        apikey: First part of its topics.
-        origins: Gives each message its place in the count.
+        sender: This start of this robot.
         enqueue: Takes telemetry; the newest of a topic wins.
+        echoes: Returns the newest feedback of each author that had come by a moment
+            (s since boot), the author known longest first; None for recordings, which
+            prove no age.
 
     Moments are the robot's own: monotonic seconds since its boot, and its wall clock.
     """
 
     def __init__(
         self,
-        robot_id: str,
-        apikey: str,
-        origins: Origins,
+        sender: Sender,
         enqueue: Callable[[str, bytes], None],
+        echoes: Callable[[float], tuple[FeedbackRef, ...]] | None = None,
     ) -> None:
-        self._id = robot_id
-        self._apikey = apikey
-        self._origins = origins
-        self._enqueue = enqueue
+        self._sender, self._enqueue, self._echoes = sender, enqueue, echoes
+        self._newest = {_SAFETY: (sender.first_report - 1, 0.0)}
+        """``seq`` and moment (s since boot) of the newest message of each topic."""
         self.rates = UplinkRates()
 
-    def send(self, observation: Observation, at: Instant) -> None:
-        """Send an observation of this moment."""
+    def send(self, observation: Observation, at: Instant, age_s: float = 0.0) -> None:
+        """Send an observation that was measured ``age_s`` ago (s)."""
         suffix = _suffix_of(observation)
-        origin = self._origins.next(suffix, at)
-        stamped = replace(observation, robot_id=self._id, origin=origin)
+        origin = self._origin(suffix, at, age_s)
+        stamped = replace(observation, robot_id=self._sender.robot_id, origin=origin)
         payload = codec.write_measure(stamped)
         if self.rates.is_measure(suffix, at.mono):
             self._enqueue(self._topic(suffix), payload)
         else:
-            self._enqueue(names.direct_topic(self._id, suffix), payload)
+            self._enqueue(names.direct_topic(self._sender.robot_id, suffix), payload)
 
     def report(
         self, report: SafetyReport, at: Instant, *, is_measure: bool = True
     ) -> tuple[int, list[LaneMessage]]:
-        """Build a safety report: its ``seq`` and its messages, the direct one first.
+        """Build a safety report: ``seq`` and messages, the direct message first.
 
         Both have the same bytes: the first to arrive counts.
         """
-        origin = self._origins.next(_SAFETY, at)
+        origin = self._origin(_SAFETY, at)
         payload = codec.write_measure(replace(report, origin=origin))
-        messages = [(names.direct_topic(self._id, _SAFETY), payload)]
+        messages = [(names.direct_topic(self._sender.robot_id, _SAFETY), payload)]
         if is_measure:
             messages.append((self._topic(_SAFETY), payload))
         return origin.seq or 0, messages
@@ -333,12 +308,31 @@ class Uplink:
     def answer(self, answer: CommandAnswer | GoalAnswer, at: Instant) -> LaneMessage:
         """The message of an answer on ``cmdexe``."""
         count = _GOALS if isinstance(answer, GoalAnswer) else _ANSWERS
-        origin = self._origins.next(count, at)
-        topic = names.answer_topic(self._apikey, self._id)
+        origin = self._origin(count, at)
+        topic = names.answer_topic(self._sender.apikey, self._sender.robot_id)
         return topic, codec.write_answer(replace(answer, origin=origin))
 
+    def _origin(self, suffix: str, at: Instant, age_s: float = 0.0) -> Origin:
+        """Origin of the next message of a topic, at its measurement."""
+        count, before = self._newest.get(suffix, (0, 0.0))
+        echoes = None if self._echoes is None else self._echoes(at.mono - age_s)
+        # Ages by stamps are no clock: after a stamp that fell, moments still rise.
+        measured = at.later(max(-age_s, min(0.0, before + _LEAST_APART_S - at.mono)))
+        self._newest[suffix] = count + 1, measured.mono
+        return Origin(
+            self._sender.boot,
+            count + 1,
+            codec.format_stamp(measured.wall),
+            measured.wall,
+            measured.mono,
+            acknowledgements=echoes is not None,
+            heard=echoes[0] if echoes else None,
+            heard_also=echoes[1:] if echoes else (),
+            replay=self._sender.replay,
+        )
+
     def _topic(self, suffix: str) -> str:
-        return names.measure_topic(self._apikey, self._id + suffix)
+        return names.measure_topic(self._sender.apikey, self._sender.robot_id + suffix)
 
 
 def _suffix_of(observation: Observation) -> str:

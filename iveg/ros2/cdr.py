@@ -1,6 +1,6 @@
-"""Plain CDR, the bytes of a ROS 2 message in both byte orders, by rosbags.
+"""Plain CDR, the bytes of a ROS 2 message, by rosbags; either byte order is read.
 
-Arrays that are read are views of the payload, sequences are lists.
+Arrays that are read are views of the payload; sequences are lists.
 """
 
 from functools import cache
@@ -13,11 +13,11 @@ from iveg.ros2.messages import STORE, Message
 
 
 def read(message: type[Message], payload: bytes) -> Any:
-    """Read one message, after which up to three bytes of padding may come.
+    """Read one message, with up to three bytes of padding behind it.
 
     Args:
         message: Its type.
-        payload: With its encapsulation.
+        payload: Its bytes with their encapsulation.
 
     Raises:
         UnreadableError: bytes that this type does not describe.
@@ -30,9 +30,8 @@ def read(message: type[Message], payload: bytes) -> Any:
 
 
 def write(message: Message) -> bytes:
-    """The bytes of one message, with its encapsulation; the lowest comes first."""
-    written = STORE.serialize_cdr(message, message.ROS, little_endian=True)
-    return bytes(written)
+    """Little-endian bytes of one message, with their encapsulation."""
+    return bytes(STORE.serialize_cdr(message, message.ROS, little_endian=True))
 
 
 # --- type hash --------------------------------------------------------------------
@@ -40,7 +39,7 @@ def write(message: Message) -> bytes:
 # The hash of a ROS message type, which endpoints announce (REP-2011, REP-2016).
 
 _HASH, _GATE = "typehash", "iveggate"
-"""Keys of USER_DATA; ROS 2 reads letters and digits alone as one."""
+"""Keys of USER_DATA; ROS 2 takes keys of letters and digits only."""
 
 
 @cache
@@ -54,7 +53,7 @@ def user_data(message: type[Message], gate: str = "") -> bytes:
 
     Args:
         message: Its type.
-        gate: Id of the robot whose gate has the endpoint, which is told beside.
+        gate: Id of the robot whose gate has the endpoint; empty: no gate of iVeg.
     """
     mark = f"{_GATE}={gate};" if gate else ""
     return f"{_HASH}={type_hash(message)};{mark}".encode()

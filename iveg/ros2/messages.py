@@ -98,7 +98,7 @@ class Time(Message):
     nanosec: int = 0
 
     @classmethod
-    def of(cls, seconds: float) -> "Time":
+    def from_seconds(cls, seconds: float) -> "Time":
         """The stamp of a Unix time (s)."""
         whole = math.floor(seconds)
         return cls(whole, min(999_999_999, round((seconds - whole) * 1e9)))

@@ -36,7 +36,7 @@ class Qos:
         return ""
 
     def __str__(self) -> str:
-        """As ``iveg robot check`` prints it."""
+        """Text for the table of ``iveg robot check``."""
         kept = ", kept" if self.transient_local else ""
         return ("reliable" if self.reliable else "best effort") + kept
 
@@ -47,7 +47,7 @@ class Qos:
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """A writer or reader that somebody has on the domain.
+    """A writer or reader on the domain.
 
     Attributes:
         topic: Full ROS name.

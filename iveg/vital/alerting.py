@@ -34,16 +34,16 @@ class Alerting:
         )
         self._event_log.changed(topics.ALERTS.name)
 
-    def sync(self, wrong: Iterable[Condition], now: Instant) -> None:
+    def sync(self, conditions: Iterable[Condition], now: Instant) -> None:
         """Take the conditions that hold now."""
-        changed = self._book.sync(wrong, now, self._new_id())
+        changed = self._book.sync(conditions, now, self._new_id())
         for alert in changed:
             self._event_log.alert(alert)
             step = "raised" if alert.cleared is None else "cleared"
             self._event_log.log(alert_line(step, alert), now)
             if alert.condition.robot_id is not None:
-                # A P1 is part of its situation.
-                self._event_log.changed(topics.ROBOT.of(alert.condition.robot_id))
+                # The robot's situation rests on its alerts, so its card changes too.
+                self._event_log.changed(topics.ROBOT.for_id(alert.condition.robot_id))
         raised = [alert for alert in changed if alert.cleared is None]
         if raised:
             self._tell("raised", raised)
@@ -51,7 +51,7 @@ class Alerting:
     def acknowledge(
         self, alert_id: str, by: str, note: str, now: Instant
     ) -> BookedAlert | None:
-        """A person acknowledges an alert; None when there is no such alert."""
+        """Acknowledge an alert for a person; None when there is no such alert."""
         alert = self._book.acknowledge(alert_id, by, note, now)
         if alert is not None:
             self._event_log.alert(alert)
@@ -61,17 +61,17 @@ class Alerting:
     def acknowledge_together(
         self, alert_ids: Iterable[str], by: str, note: str, now: Instant
     ) -> list[BookedAlert]:
-        """A person acknowledges a list but its P1s; those that are now.
+        """Acknowledge a list except its P1s; returns the alerts that changed.
 
-        Each P1 is about somebody in danger: it sounds until it was read by itself.
+        A P1 is about somebody in danger: it sounds until it is acknowledged singly.
         """
-        found = (self._book.find(alert_id) for alert_id in alert_ids)
+        alerts = (self._book.find(alert_id) for alert_id in alert_ids)
         lesser = [
             alert.alert_id
-            for alert in found
+            for alert in alerts
             if alert is not None
             and alert.priority != "P1"
             and not alert.last.acknowledged
         ]
-        seen = (self.acknowledge(alert_id, by, note, now) for alert_id in lesser)
-        return [alert for alert in seen if alert is not None]
+        changed = (self.acknowledge(alert_id, by, note, now) for alert_id in lesser)
+        return [alert for alert in changed if alert is not None]

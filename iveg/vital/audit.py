@@ -1,7 +1,7 @@
-"""The one port by which the audit is written: an act in, a row on its way.
+"""Port of the audit: takes an act and queues its row.
 
-It never waits: rows go the way of the history, so that a STOP works where the disk is
-full or the database away, and the row that comes late says so.
+It never waits for the history, so a STOP works with a full disk or without a database.
+A row keeps the time of its act, however late it is stored.
 """
 
 import json
@@ -14,7 +14,7 @@ from iveg.vital.record import RecordSink
 
 
 class AuditTrail:
-    """Writes down who did what.
+    """Writes acts and their actors to the audit.
 
     Args:
         sink: The history's recorder.
@@ -22,8 +22,7 @@ class AuditTrail:
     """
 
     def __init__(self, sink: RecordSink, new_id: Ids) -> None:
-        self._sink = sink
-        self._new_id = new_id
+        self._sink, self._new_id = sink, new_id
 
     def note(
         self,
@@ -34,7 +33,7 @@ class AuditTrail:
         *,
         at: Instant,
     ) -> None:
-        """Write one act down; returns at once."""
+        """Queue the row of one act; returns at once."""
         self._sink.enqueue(
             AuditRecord(
                 audit_id=self._new_id(),

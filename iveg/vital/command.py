@@ -37,7 +37,7 @@ from iveg.domain.stop import (
     StopMachine,
 )
 from iveg.domain.stop.commands import PLAIN
-from iveg.domain.stop.machine import of_machines
+from iveg.domain.stop.machine import stop_conditions
 from iveg.domain.transports import FIWARE, TransportId
 from iveg.vital import topics
 from iveg.vital.core import Core
@@ -47,7 +47,7 @@ CameBack = Callable[[StopMachine, list[Effect], Instant], None]
 _Send = Callable[[], Coroutine[None, None, None]]
 _KEPT = 200
 REMEMBERED_S = 60.0
-"""Time that a press is known by its id (s)."""
+"""Time for which a press is known by its id (s)."""
 _MOST_PRESSES = 4096
 
 _JOURNALLED: Mapping[str, Literal["stopped", "run"]] = {
@@ -57,15 +57,15 @@ _JOURNALLED: Mapping[str, Literal["stopped", "run"]] = {
     "moved": "stopped",
     "release_unconfirmed": "stopped",
 }
-"""Changes of what is wanted that no person's call has written down already."""
+"""Changes of the desired state that no person's call has written to the journal."""
 
 
 class Presses:
     """The command of each press, for a while: one press is one STOP.
 
     A page sends a press over HTTP and over its WebSocket and repeats it until it is
-    taken.  One that comes back later counts as a new press, because a STOP too many is
-    better than one too few.
+    taken.  A press that comes back later counts as new, because a STOP too many is
+    better than a STOP too few.
     """
 
     def __init__(self) -> None:
@@ -74,7 +74,7 @@ class Presses:
         )
 
     def find(self, by: str, press: Press, robot_id: str, at: Instant) -> str | None:
-        """The command that this press has begun; None for a new press."""
+        """Id of the command that this press has begun; None for a new press."""
         if press.press_id is None:
             return None
         since, command_id = self._known.get(
@@ -100,8 +100,8 @@ class OrderSender:
     transport holds up no other.
 
     Args:
-        core: Of its ports the transports, the fleet and the journal.
-        came_back: Told how each send went.
+        core: It has the transports, the fleet and the journal.
+        came_back: Called with the effects of each send that ended.
     """
 
     def __init__(self, core: Core, came_back: CameBack) -> None:
@@ -132,8 +132,8 @@ class OrderSender:
 
     def publish_desired_states(self) -> None:
         """Publish every desired state again: the broker is connected."""
-        for wanted in self._desired_states.values():
-            self.set_desired_state(wanted)
+        for state in self._desired_states.values():
+            self.set_desired_state(state)
 
     def start(self, work: Coroutine[None, None, None], name: str) -> None:
         """Run this as a task; a failure is logged."""
@@ -144,7 +144,7 @@ class OrderSender:
     def _finished(self, task: asyncio.Task[None]) -> None:
         self._tasks.discard(task)
         if not task.cancelled() and task.exception() is not None:
-            _log.error("%s failed", task.get_name(), exc_info=task.exception())
+            _log.error("task %s has failed", task.get_name(), exc_info=task.exception())
 
     async def close(self) -> None:
         """Cancel the sends that are under way."""
@@ -161,8 +161,8 @@ class OrderSender:
             self._event_log.flushed(), self._note_named(machine, effect)
         )
         command, attempt = effect.attempt.command, effect.attempt
-        if machine.once is None or machine.once.command_id != command.command_id:
-            # The disk took so long that a STOP has come, or taken its place.
+        if machine.order is None or machine.order.command_id != command.command_id:
+            # While the disk wrote, a STOP has come or taken the order's place.
             return
         challenge, order = attempt.challenge, command.command_id
         for transport, way in command.transports.items():
@@ -178,15 +178,15 @@ class OrderSender:
             self.start(work, f"{command.kind}-{transport}-{machine.robot_id}")
 
     async def _note_named(self, machine: StopMachine, effect: SendOnce) -> None:
-        """Write down which STOPs a release names: none is asserted as new again."""
+        """Journal the STOPs that a release names: none may be asserted again as new."""
         if machine.hold_id is None or not effect.ours:
             return
-        by = "iveg" if machine.stop is None else machine.stop.requesters[0]
+        requester = "iveg" if machine.stop is None else machine.stop.requesters[0]
         await self._journal.log_desired(
             machine.robot_id,
             "stopped",
             machine.hold_id,
-            by,
+            requester,
             self._clock(),
             named=effect.ours,
             challenge=effect.attempt.challenge,
@@ -199,11 +199,11 @@ class OrderSender:
         command_id: str,
         send: _Send,
     ) -> None:
-        """Send, and report the result to the machine, whatever went wrong.
+        """Send, and report the result to the machine, any error included.
 
         A transport whose failure was not reported would count as busy for ever.
         """
-        ok, left = False, self._clock()
+        ok, sent_at = False, self._clock()
         try:
             await send()
             ok = True
@@ -211,10 +211,10 @@ class OrderSender:
             _log.info("order by transport %s: %s", transport, error)
         finally:
             at = self._clock()
-            # What lies behind Orion may be known to pass nothing on.
+            # Orion may take an order although the way behind it is known to be cut.
             doubtful = transport == FIWARE.id and self._health_monitor.is_cut(at)
             effects = machine.sent(
-                transport, command_id, at, ok=ok, doubtful=doubtful, left=left
+                transport, command_id, at, ok=ok, doubtful=doubtful, handed_over=sent_at
             )
             self._came_back(machine, effects, at)
 
@@ -232,7 +232,7 @@ class Commander:
     """Keeps one STOP machine for each robot and carries out its effects.
 
     Attributes:
-        machines: By robot.
+        machines: STOP machine of each robot, by its id.
         commands: The newest commands, by id, as they stand.
     """
 
@@ -276,12 +276,11 @@ class Commander:
         known = self._presses.find(by, press, machine.robot_id, at)
         earlier = None if known is None else self.commands.get(known)
         if earlier is not None and not machine.follows(earlier):
-            # That press has had its life: a late copy of it is no new wish.
+            # The command of that press is over: a late copy of it is no new press.
             return earlier
         self._perform(machine, machine.press(by, at, self._new_id(), press=press), at)
         assert machine.stop is not None  # noqa: S101 - a press begins an episode
-        command_id = machine.stop.command_id
-        self._presses.note(by, press, machine.robot_id, command_id, at)
+        self._presses.note(by, press, machine.robot_id, machine.stop.command_id, at)
         return machine.stop
 
     async def _write_down(
@@ -292,17 +291,19 @@ class Commander:
         Returns:
             The commands as they are by then.
         """
-        # Let every send reach its socket before the disk is asked for anything.
+        # Let every send reach its socket before the disk is used.
         await asyncio.sleep(0)
-        stands = [one for one in pressed if self.machine(one.robot_id).follows(one)]
+        stands = [stop for stop in pressed if self.machine(stop.robot_id).follows(stop)]
         await asyncio.gather(
             self._event_log.flushed(),
             *(
-                self._journal.log_desired(one.robot_id, "stopped", one.hold_id, by, at)
-                for one in stands
+                self._journal.log_desired(
+                    stop.robot_id, "stopped", stop.hold_id, by, at
+                )
+                for stop in stands
             ),
         )
-        return [self.commands.get(one.command_id, one) for one in pressed]
+        return [self.commands.get(stop.command_id, stop) for stop in pressed]
 
     async def release(
         self, robot_id: str, seen: Iterable[str], by: str, at: Instant
@@ -329,8 +330,8 @@ class Commander:
         self, machine: StopMachine, effects: list[Effect], at: Instant
     ) -> FollowedCommand:
         self._perform(machine, effects, at)
-        assert machine.once is not None  # noqa: S101 - just begun
-        return machine.once
+        assert machine.order is not None  # noqa: S101 - just begun
+        return machine.order
 
     # --- what comes back ----------------------------------------------------------
 
@@ -340,9 +341,9 @@ class Commander:
         """Apply a new observation to the machine of its robot.
 
         Args:
-            received: What is new.
-            age_s: How old it was at most when it came (s); infinite where unknown.
-            motion: Of the robot by all that is known.
+            received: The new observation.
+            age_s: Upper bound of its age at receipt (s); infinite where unknown.
+            motion: Motion of the robot by all its sources.
         """
         observation, at = received.observation, received.at
         machine = self.machines.get(observation.robot_id)
@@ -370,29 +371,31 @@ class Commander:
         self._perform(machine, effects, at)
 
     def tick(self, now: Instant) -> None:
-        """Deadlines, and orders that must be sent again."""
+        """Let time pass: deadlines, and orders that must be sent again."""
         for machine in self.machines.values():
             self._perform(machine, machine.tick(now, self._new_id()), now)
 
     def restore(self, wanted: Mapping[str, DesiredRecord], now: Instant) -> None:
-        """After a restart: stop every robot again that was to stand."""
-        for robot_id, one in wanted.items():
+        """Stop every robot again that was to stand before a restart."""
+        for robot_id, desired in wanted.items():
             machine = self.machines.get(robot_id)
             if machine is not None:
-                self._perform(machine, machine.restore(one, now, self._new_id()), now)
+                self._perform(
+                    machine, machine.restore(desired, now, self._new_id()), now
+                )
 
     def close_earlier(self, left: Iterable[CommandRecord], now: Instant) -> None:
         """Close the rows that an earlier run left open; nobody follows them any more.
 
-        The row of a STOP that was asserted again names its successor; of every other
-        row the end is unknown.
+        The row of a STOP that was asserted again names its successor; the end of every
+        other row is unknown.
         """
         for row in left:
             if row.command_id in self.commands or row.kind == "goal":
                 continue
             machine = self.machines.get(row.robot_id)
             heir = None
-            # One that waited for its resume had been released: nothing took its place.
+            # A STOP that waited for its resume was released: nothing took its place.
             stood = row.kind == "stop" and row.state != "READY"
             if machine is not None and machine.wants_stop and stood:
                 heir = None if machine.stop is None else machine.stop.command_id
@@ -405,7 +408,7 @@ class Commander:
 
     def conditions(self, now: Instant) -> Iterable[Condition]:
         """Alert conditions of STOP."""
-        return of_machines(self.machines.values(), now)
+        return stop_conditions(self.machines.values(), now)
 
     # --- effects ------------------------------------------------------------------
 
@@ -416,7 +419,7 @@ class Commander:
             match effect:
                 case SendStop():
                     self._sender.send_stop(machine, effect)
-                    # A silent robot says nothing that would carry the new count.
+                    # A silent robot sends nothing that would bring pages the new count.
                     self._show(machine)
                 case SendOnce():
                     self._sender.send_once(machine, effect)
@@ -433,6 +436,7 @@ class Commander:
                     self._event_log.command(command, end, at)
                 case OffTable():
                     self._note_mistake(effect)
+        # Steps replace commands by new values; the list keeps the newest.
         for command in machine.commands:
             if command.command_id in self.commands:
                 self.commands[command.command_id] = command
@@ -446,28 +450,28 @@ class Commander:
     def _came_back(
         self, machine: StopMachine, effects: list[Effect], at: Instant
     ) -> None:
-        """A transport took the order or failed: the command's display changes."""
+        """Take the end of a send: a transport took the order, or failed."""
         self._perform(machine, effects, at)
         self._show(machine)
 
     def _show(self, machine: StopMachine) -> None:
-        self._event_log.changed(topics.ROBOT.of(machine.robot_id))
+        self._event_log.changed(topics.ROBOT.for_id(machine.robot_id))
 
     def _record(self, machine: StopMachine, changed: Changed, at: Instant) -> None:
-        self.commands |= {one.command_id: one for one in changed.commands}
+        self.commands |= {command.command_id: command for command in changed.commands}
         while len(self.commands) > _KEPT:
             del self.commands[next(iter(self.commands))]
         command = self.commands.get(changed.command_id)
-        # A release that is confirmed moves the row of its STOP on, too.
+        # A confirmed release also changes the row of its STOP.
         for followed in changed.commands:
             step = changed if followed is command else None
             self._event_log.command(followed, step, at)
         desired = _JOURNALLED.get(changed.key)
         if desired is not None:
-            by = "iveg" if command is None else command.requesters[0]
+            requester = "iveg" if command is None else command.requesters[0]
             self._sender.start(
                 self._journal.log_desired(
-                    machine.robot_id, desired, machine.hold_id, by, at
+                    machine.robot_id, desired, machine.hold_id, requester, at
                 ),
                 f"journal-{machine.robot_id}",
             )

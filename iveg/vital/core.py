@@ -1,4 +1,4 @@
-"""The state of the fleet and the ways out of it, which the parts of iVeg share."""
+"""Shared state of one iVeg: the world, its people, and the ports to the outside."""
 
 from dataclasses import dataclass
 
@@ -13,11 +13,11 @@ from iveg.vital.supervision import Supervision
 
 @dataclass(frozen=True, slots=True)
 class Core:
-    """Shared state of one iVeg; every part is given it whole.
+    """Shared state of one iVeg, which every part gets whole.
 
     Attributes:
-        supervision: Tells comfort what happens.
-        boot: Random, new at each start: identity of our feedback.
+        supervision: Publishes events to comfort, and guards its failures.
+        boot: Random, new at each start: identifies the feedback of this run.
     """
 
     world: World

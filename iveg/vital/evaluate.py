@@ -1,9 +1,9 @@
 """Observations change the world, and the world changes speed limits.
 
-``apply`` takes one observation and ``settle`` judges the fleet, once for all that was
-taken; ``tick`` does what time alone brings: silence, expiry, overdue links.  The
+``apply`` takes one observation, and ``settle`` judges the fleet once for all that was
+taken.  ``tick`` adds the effects of time alone: silence, expiry, overdue links.  The
 heartbeat to the fleet is sent from here and nowhere else, so that a loop that hangs
-falls silent and slows the robots.
+falls silent and the robots slow.
 """
 
 from collections.abc import Iterable, Sequence
@@ -13,13 +13,14 @@ from iveg.domain.decisions import Decisions
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import Condition, LogEvent
 from iveg.domain.feedback import UNSUPERVISED, SpeedLimit
-from iveg.domain.kinds import kind
+from iveg.domain.kinds import KIND_OF
 from iveg.domain.limits import LIMITS
 from iveg.domain.low_values import LowValues
 from iveg.domain.observations import (
     Climate,
     DetectionFrame,
     Instant,
+    Observation,
     Odometry,
     Received,
     SafetyReport,
@@ -30,6 +31,7 @@ from iveg.domain.rule.clear import ClearCondition
 from iveg.domain.rule.foresight import Encounter
 from iveg.domain.rule.judge import SpeedLimits
 from iveg.domain.rule.zones import LimitChange, ZoneEntry
+from iveg.domain.stream_order import Freshness
 from iveg.domain.tracking.people import People
 from iveg.vital import topics
 from iveg.vital.alerting import Alerting
@@ -40,8 +42,8 @@ from iveg.vital.feedback import FeedbackPublisher
 from iveg.vital.staleness import Staleness
 
 HEARTBEAT_S, _EARLY_S = 0.1, 0.02
-"""Between two heartbeats; so early one goes rather than a whole tick late."""
-_TOPIC_OF = {
+"""Time between heartbeats; one goes this early rather than a whole tick late (s)."""
+_TOPICS = {
     "robot": topics.ROBOT,
     "scan": topics.SCAN,
     "climate": topics.CLIMATE,
@@ -75,27 +77,31 @@ class Evaluator:
         self._obedience = Obedience()
         self._moved: dict[str, Odometry] = {}
         self._unlogged: dict[str, SafetyReport] = {}
-        """Reports of another factor; the next judgement may make their decisions."""
+        """Reports of a changed factor; the next judgement may explain it in the log."""
         self._unjudged: Instant | None = None
         self._started: Instant | None = None
 
     def beginning(self) -> tuple[People, SpeedLimits]:
-        """Known people and present limits, for another rule to begin with."""
+        """Copies of people and limits, from which a rule trial begins."""
         return self.people.copy(), self._speed_limits.copy()
 
     @property
     def entries(self) -> Iterable[ZoneEntry]:
-        """Every robot that is inside a zone now, with the zone."""
+        """Every zone entry that has not ended."""
         return self._speed_limits.entries
 
     def encounters(self, robot_id: str, now: Instant) -> Sequence[Encounter]:
         """Zones that a robot will reach, the soonest first; old forecasts left out."""
-        ahead = self._speed_limits.encounters.get(robot_id, {}).values()
-        young = (one for one in ahead if now.mono - one.at <= LIMITS.silence_s)
-        return sorted(young, key=lambda one: one.in_s)
+        encounters = self._speed_limits.encounters.get(robot_id, {}).values()
+        young = (
+            forecast
+            for forecast in encounters
+            if now.mono - forecast.at <= LIMITS.silence_s
+        )
+        return sorted(young, key=lambda forecast: forecast.in_s)
 
     def unmet(self, robot_id: str) -> Sequence[ClearCondition]:
-        """Clear conditions that a robot lacks now, the reason first."""
+        """Clear conditions that a robot does not meet now, its limit's reason first."""
         return self._speed_limits.unmet.get(robot_id, ())
 
     def decision_record(self, decision_id: str) -> DecisionRecord | None:
@@ -105,39 +111,39 @@ class Evaluator:
 
     # --- what arrives -------------------------------------------------------------
 
-    def apply(self, received: Received) -> bool:
-        """Apply one observation; :meth:`settle` judges what follows from it.
+    def apply(self, received: Received) -> Freshness:
+        """Apply one observation; :meth:`settle` judges what follows from it."""
+        freshness = self.world.apply(received)
+        observation, at = received.observation, received.at
+        if freshness == "new":
+            self._note(observation, at)
+        if freshness in ("new", "stored"):
+            changes = KIND_OF[type(observation)].changes
+            if changes is not None:
+                self._event_log.changed(_TOPICS[changes].for_id(observation.robot_id))
+        if isinstance(observation, DetectionFrame) and freshness != "refused":
+            # A late frame may still protect somebody.
+            self.tracking.track_frame(observation, received, freshness, self.rule)
+        return freshness
 
-        Returns:
-            Whether it became part of the state.
-        """
-        verdict = self.world.apply(received)
-        if verdict == "refused":
-            return False
-        observation = received.observation
-        if isinstance(observation, DetectionFrame):
-            self.tracking.track_frame(observation, received, verdict, self.rule)
-        if verdict != "new":
-            return False
-        row, robot_id = kind(observation), observation.robot_id
-        if row.changes is not None:
-            self._event_log.changed(_TOPIC_OF[row.changes].of(robot_id))
-        if row.sensor is not None:
-            self._event_log.reading(row, observation, received.at)
+    def _note(self, observation: Observation, at: Instant) -> None:
+        """Note a new observation: its changes, and whether it calls for a judgement."""
         match observation:
             case Odometry():
-                self._drove(observation, received.at)
+                self._drove(observation, at)
             case Climate():
-                self._event_log.climate(observation, received.at)
+                self._event_log.climate(observation, at)
             case SafetyReport():
-                self._reported(observation, received.at, is_kept=received.asked)
+                self._reported(observation, at)
             case DetectionFrame():
-                self._await_judgement(received.at)
-        return True
+                self._await_judgement(at)
+        row = KIND_OF[type(observation)]
+        if row.sensor is not None:
+            self._event_log.reading(row, observation, at)
 
     @property
     def is_unjudged(self) -> bool:
-        """Whether something was taken that :meth:`settle` has not judged yet."""
+        """Whether :meth:`settle` has yet to judge an observation."""
         return self._unjudged is not None
 
     def _await_judgement(self, at: Instant) -> None:
@@ -170,13 +176,10 @@ class Evaluator:
         self._await_judgement(at)
         self._moved[odometry.robot_id] = odometry
 
-    def _reported(self, report: SafetyReport, at: Instant, *, is_kept: bool) -> None:
-        """Take a report; one that Orion kept says nothing of now and is no news."""
+    def _reported(self, report: SafetyReport, at: Instant) -> None:
         self._event_log.decisions(self.decisions.reported(report, at))
-        if is_kept:
-            return
         measured_at = self.world.robot(report.robot_id).safety_received
-        if self.tracking.witness(report, measured_at or at):
+        if self.tracking.track_obstacle(report, measured_at or at):
             self._await_judgement(at)
         if report.speed_factor != self._applied.get(report.robot_id):
             self._applied[report.robot_id] = report.speed_factor
@@ -190,16 +193,15 @@ class Evaluator:
             self.world, self.people, self.rule, now, self._new_id()
         )
         for change in changes:
-            self._crossed(change, now)
+            self._note_change(change, now)
         before, self.speed_limits = self.speed_limits, speed_limits
         changed = [
             robot_id
             for robot_id, speed_limit in speed_limits.items()
-            if speed_limit is not before[robot_id]
-            and _told_of(speed_limit) != _told_of(before[robot_id])
+            if _compared_part(speed_limit) != _compared_part(before[robot_id])
         ]
         for robot_id in changed:
-            self._event_log.changed(topics.ROBOT.of(robot_id))
+            self._event_log.changed(topics.ROBOT.for_id(robot_id))
         slower = any(
             speed_limits[robot_id].speed_factor < before[robot_id].speed_factor
             for robot_id in changed
@@ -209,18 +211,17 @@ class Evaluator:
             self.publish(now)
         self._tell("judged", self.rule, speed_limits, changes, now)
 
-    def _crossed(self, change: LimitChange, now: Instant) -> None:
+    def _note_change(self, change: LimitChange, now: Instant) -> None:
         entry = change.entry
         if not change.began:
-            ended = self.decisions.end(entry.decision_id, now)
-            self._event_log.decisions(ended)
+            self._event_log.decisions(self.decisions.end(entry.decision_id, now))
             return
-        places = places_of(entry, self.world)
-        begun = self.decisions.begin(entry, self.rule, places)
-        self._event_log.decisions([begun])
+        self._event_log.decisions(
+            [self.decisions.begin(entry, self.rule, places_of(entry, self.world))]
+        )
 
     def publish(self, now: Instant) -> None:
-        """Publish feedback to the fleet (Algorithm 2, line 13)."""
+        """Publish feedback to the fleet (Algorithm 2, line 12)."""
         self._feedback_publisher.publish(self.speed_limits, self.rule, now)
         self._obedience.published(self.speed_limits, now)
         self._event_log.decisions(self.decisions.published(now))
@@ -240,7 +241,7 @@ class Evaluator:
         self._settle(now)
         if now.mono - self._feedback_publisher.published_at >= HEARTBEAT_S - _EARLY_S:
             self.publish(now)
-        self._event_log.decisions(self.decisions.age(self._heard_s))
+        self._event_log.decisions(self.decisions.age(self._received_s))
         self.alerts.sync([*self._conditions(now), *more], now)
 
     def _log_returned_detectors(self, now: Instant) -> None:
@@ -255,11 +256,11 @@ class Evaluator:
     def _conditions(self, now: Instant) -> Iterable[Condition]:
         for robot in self.world.live_robots():
             ignored = self._obedience.ignored(robot, now)
-            yield from alerts.of_ignored(robot.robot_id, ignored)
+            yield from alerts.of_ignored_limit(robot.robot_id, ignored)
             yield from alerts.of_robot(robot, now)
             yield from alerts.of_detector(robot, now, started=self._started or now)
             yield from self._low.conditions(robot)
-            yield from alerts.of_kind(robot, now)
+            yield from alerts.of_replay(robot, now)
             yield from alerts.of_description(robot, now)
         yield from alerts.of_other_authors(self.world.other_authors.speaking(now))
         yield from alerts.of_rule(self.rule)
@@ -267,9 +268,9 @@ class Evaluator:
         answers = self.world.word_answers.known.values()
         yield from alerts.of_words(self.world.live_robots(), answers)
 
-    def _heard_s(self, entry: ZoneEntry) -> float:
-        robot = self.world.robot(entry.robot_id)
-        return robot.heard_for_s(entry.entered.mono)
+    def _received_s(self, entry: ZoneEntry) -> float:
+        """Time since an entry in which its robot was not silent (s)."""
+        return self.world.robot(entry.robot_id).contact_for_s(entry.entered.mono)
 
     def close_earlier(
         self,
@@ -282,17 +283,17 @@ class Evaluator:
         Their ids are random, so a row that is not in memory is not of this run.
         """
         self._event_log.left_behind(
-            [one for one in decisions if self.decisions.get(one.decision_id) is None],
-            [one for one in alerts if not self.alerts.knows(one.alert_id)],
+            [row for row in decisions if self.decisions.get(row.decision_id) is None],
+            [row for row in alerts if not self.alerts.knows(row.alert_id)],
             now,
         )
 
     def leave(self, now: Instant) -> None:
-        """Break off open decisions when iVeg stops, so that the record says so."""
+        """Break off open decisions when iVeg stops, so that their record says so."""
         self._event_log.decisions(self.decisions.break_off(now))
 
     def leave_unsupervised(self, now: Instant) -> None:
-        """Tell every robot to slow, once: a part without which nobody watches ended."""
+        """Tell every robot to slow, once: a part that supervision needs has ended."""
         limits = dict.fromkeys(self.world.robots, UNSUPERVISED)
         self._feedback_publisher.publish(limits, self.rule, now)
 
@@ -305,6 +306,6 @@ class Evaluator:
         )
 
 
-def _told_of(limit: SpeedLimit) -> tuple[float, str, str | None]:
-    """The part of a limit that people and robots are told when it changes."""
+def _compared_part(limit: SpeedLimit) -> tuple[float, str, str | None]:
+    """Part of a limit that counts as a change; its distance changes all the time."""
     return limit.speed_factor, limit.reason, limit.cause

@@ -1,4 +1,4 @@
-"""The event log: events and changes for people at once, and rows for the history.
+"""Event log: lines and changes for browsers at once, rows for the history.
 
 One place turns domain values into log lines and history records, so that the page, the
 API and the database agree.
@@ -46,8 +46,8 @@ from iveg.vital.record import ODOMETRY_PERIOD_S, RecordSink
 from iveg.vital.supervision import Supervision
 
 _KEPT_LINES = 500
-# ``asdict`` takes four times as long, for each box of each picture that is kept.
-_SIDES = tuple(one.name for one in fields(Box3D))
+# ``asdict`` takes four times as long, and each stored box would pay for it.
+_SIDES = tuple(side.name for side in fields(Box3D))
 READING_PERIOD_S = 60.0
 """Air and batteries change slowly: a day is 1,440 rows."""
 _P = ParamSpec("_P")
@@ -56,7 +56,7 @@ _P = ParamSpec("_P")
 def _guarded(
     write: Callable[Concatenate["EventLog", _P], None],
 ) -> Callable[Concatenate["EventLog", _P], None]:
-    """Guard a write: its failure is the history's, not that of what is recorded."""
+    """Guard a write: its failure harms the history alone."""
 
     @wraps(write)
     def guarded(log: "EventLog", /, *args: _P.args, **kwargs: _P.kwargs) -> None:
@@ -77,11 +77,11 @@ class EventLog:
     ) -> None:
         self.supervision = supervision
         self._sink = sink
-        self._told: dict[str, tuple[float, float | None, str]] = {}
-        """Limit, applied factor and link that a robot's pose was last kept with."""
-        # The last reading of each robot and kind; the air is of no robot.
-        self._kept: dict[tuple[str, type[Observation]], float] = {}
-        # Starting at the clock keeps ids growing over restarts without asking anyone.
+        self._recorded: dict[str, tuple[float, float | None, str]] = {}
+        """Limit, applied factor and link in the newest pose row of each robot."""
+        self._recorded_at: dict[tuple[str, type[Observation]], float] = {}
+        """Newest row by robot and kind (monotonic, s); the air's robot is ``""``."""
+        # Ids start at the clock (ms): they grow over restarts without a look-up.
         self._next_id = int(start.wall * 1000)
         self.lines: deque[LogRecord] = deque(maxlen=_KEPT_LINES)
 
@@ -91,7 +91,7 @@ class EventLog:
 
     @_guarded
     def log(self, event: LogEvent, at: Instant) -> None:
-        """One line of the log."""
+        """Write a line of the log."""
         self._next_id += 1
         record = LogRecord(
             id=self._next_id,
@@ -109,7 +109,7 @@ class EventLog:
 
     @_guarded
     def write(self, event: Callable[[], LogEvent], at: Instant) -> None:
-        """One line of the log, whose facts are looked up here and not by the caller."""
+        """Write a line of the log; its facts are looked up under the guard."""
         self.log(event(), at)
 
     @_guarded
@@ -132,9 +132,11 @@ class EventLog:
             self._sink.enqueue(cleared_behind(alert, now.wall))
 
     @_guarded
-    def detection(self, one: Placed, frame: DetectionFrame, received: Received) -> None:
+    def detection(
+        self, placed: Placed, frame: DetectionFrame, received: Received
+    ) -> None:
         """Record one detection."""
-        self._sink.enqueue(detection_of(one, frame, received))
+        self._sink.enqueue(detection_of(placed, frame, received))
 
     @_guarded
     def odometry(
@@ -143,11 +145,11 @@ class EventLog:
         """Record two poses a second, and each change of limit, factor or link."""
         robot_id, report = robot.robot_id, robot.safety
         applied = None if report is None else report.speed_factor
-        told, before = (limit, applied, link), self._told.get(robot_id)
+        state, before = (limit, applied, link), self._recorded.get(robot_id)
         is_due = self._is_due(robot_id, Odometry, at, ODOMETRY_PERIOD_S)
-        if not is_due and told == before:
+        if not is_due and state == before:
             return
-        self._told[robot_id] = told
+        self._recorded[robot_id] = state
         pose, twist = read.pose, read.twist
         self._sink.enqueue(
             OdometryRecord(
@@ -168,20 +170,20 @@ class EventLog:
     def command(
         self, command: FollowedCommand, changed: Changed | None, at: Instant
     ) -> None:
-        """Record a command that is new or has taken a step."""
+        """Record a command that is new or has changed its state."""
         self._sink.enqueue(write_command(command))
         if changed is not None:
             self._audit(command, changed.state, changed.why or changed.key, at)
         self.supervision.tell(
-            "appended", topics.COMMAND.of(command.command_id), command
+            "appended", topics.COMMAND.for_id(command.command_id), command
         )
 
     @_guarded
     def goal(self, goal: FollowedGoal, step: str | None, at: Instant) -> None:
-        """Record a goal that is new, has taken a step or came to be known better."""
-        meant = goal.goal
+        """Record a new or changed goal; ``step``: why its state changed, if it did."""
+        target = goal.goal
         record = CommandRecord(
-            command_id=meant.goal_id,
+            command_id=target.goal_id,
             robot_id=goal.robot_id,
             kind="goal",
             state=goal.state,
@@ -189,7 +191,12 @@ class EventLog:
             requested_at=goal.sent.wall,
             tries=1,
             reason=goal.why,
-            goal={"kind": meant.kind, "x": meant.x, "y": meant.y, "aisle": goal.aisle},
+            goal={
+                "kind": target.kind,
+                "x": target.x,
+                "y": target.y,
+                "aisle": goal.aisle,
+            },
         )
         self._sink.enqueue(record)
         if step is not None:
@@ -200,8 +207,8 @@ class EventLog:
         """Close a command of an earlier run.
 
         Args:
-            row: As the crash left it.
-            heir: The STOP that was asserted again in its place, if one was.
+            row: Its newest stored state.
+            heir: Id of the STOP that was asserted in its place, if any.
             at: This moment.
         """
         state = "EXPIRED" if heir is None else "REPLACED"
@@ -218,13 +225,6 @@ class EventLog:
             await self._sink.flushed()
         except Exception as error:
             self.supervision.failed("history", error)
-
-    @_guarded
-    def rule(self, event: LogEvent, at: Instant) -> None:
-        """Log a new version of the rule; its zones change, too."""
-        self.log(event, at)
-        for topic in (topics.RULE, topics.PEOPLE):
-            self.changed(topic.name)
 
     def _audit(
         self,
@@ -258,7 +258,7 @@ class EventLog:
 
     @_guarded
     def reading(self, kind: Kind, read: Observation, at: Instant) -> None:
-        """Record a reading of a small sensor, as often as the history keeps one."""
+        """Record a reading of a small sensor, once per period of its kind."""
         period_s = kind.sensor.kept_every_s if kind.sensor else READING_PERIOD_S
         if not self._is_due(read.robot_id, type(read), at, period_s):
             return
@@ -278,12 +278,12 @@ class EventLog:
         at: Instant,
         period_s: float = READING_PERIOD_S,
     ) -> bool:
-        """Whether a period has passed since the last one; the next counts from now."""
-        kept = self._kept.get((robot_id, kind), float("-inf"))
-        # What comes as often as it is kept is early as often as late.
-        is_due = at.mono - kept >= 0.95 * period_s
+        """Whether a row is due; if so, the next period starts now."""
+        last = self._recorded_at.get((robot_id, kind), float("-inf"))
+        # Readings at exactly this period arrive early half the time: allow 5 %.
+        is_due = at.mono - last >= 0.95 * period_s
         if is_due:
-            self._kept[robot_id, kind] = at.mono
+            self._recorded_at[robot_id, kind] = at.mono
         return is_due
 
     @_guarded
@@ -294,25 +294,25 @@ class EventLog:
 
 
 def detection_of(
-    one: Placed, frame: DetectionFrame, received: Received
+    placed: Placed, frame: DetectionFrame, received: Received
 ) -> DetectionRecord:
-    """One detection of a frame as a row."""
-    x, y, z = one.position
+    """Row of one detection of a frame."""
+    x, y, z = placed.position
     return DetectionRecord(
         at=received.at.wall,
         robot_id=frame.robot_id,
-        class_id=one.detection.class_id,
-        probability=one.detection.probability,
+        class_id=placed.detection.class_id,
+        probability=placed.detection.probability,
         x=x,
         y=y,
         z=z,
-        confident=one.kind != "faint",
+        confident=placed.kind != "faint",
         transport=received.transport,
         stamp=frame.origin.stamp,
-        class_=one.class_,
-        person_id=None if one.person is None else one.person.person_id,
+        class_=placed.class_,
+        person_id=None if placed.person is None else placed.person.person_id,
         box={
-            **{side: getattr(one.framed.box, side) for side in _SIDES},
-            "frame_id": one.framed.frame_id,
+            **{side: getattr(placed.framed.box, side) for side in _SIDES},
+            "frame_id": placed.framed.frame_id,
         },
     )

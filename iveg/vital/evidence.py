@@ -16,12 +16,13 @@ from iveg.domain.rule.clear import ClearCondition
 from iveg.domain.rule.zones import Zone, ZoneEntry
 from iveg.domain.stamps import wall_of
 from iveg.domain.tracking.looks import Looks
-from iveg.domain.tracking.person import Sighting, Thing
+from iveg.domain.tracking.things import Thing
+from iveg.domain.tracking.tracker import Sighting
 from iveg.domain.world import World
 
 
 def record_of(decision: SlowdownDecision) -> DecisionRecord:
-    """The whole chain as it stands; open links may yet come."""
+    """Row of a decision with its chain so far; open links may still come."""
     entry = decision.entry
     zone, sighting = entry.zone, entry.zone.sighting
     return DecisionRecord(
@@ -45,7 +46,7 @@ def record_of(decision: SlowdownDecision) -> DecisionRecord:
         rule_parameters={
             **_parameters(decision.rule, zone),
             "foretold_s": entry.foretold_s,
-            "places": [asdict(one) for one in decision.places],
+            "places": [asdict(place) for place in decision.places],
         },
         in_sight=entry.in_sight,
         feedback_at=wall_of(decision.feedback),
@@ -59,12 +60,12 @@ def record_of(decision: SlowdownDecision) -> DecisionRecord:
 
 
 def _confidence(sighting: Sighting | None) -> float | None:
-    """Confidence of a look; a laser and a peer's own pose have none."""
+    """Confidence of a sighting; None for a laser track or a peer's own pose."""
     return None if sighting is None or sighting.laser else sighting.confidence
 
 
 def places_of(entry: ZoneEntry, world: World) -> Iterator[Place]:
-    """Places of the slowed robot and the observer now, where they are known."""
+    """Present places of the slowed robot and the observer, where known."""
     for robot_id in dict.fromkeys((entry.robot_id, entry.zone.observer)):
         robot = world.robots.get(robot_id or "")
         if robot is not None and robot.odometry is not None:
@@ -74,19 +75,20 @@ def places_of(entry: ZoneEntry, world: World) -> Iterator[Place]:
             )
 
 
-def left_behind(record: DecisionRecord, found: float) -> DecisionRecord:
+def left_behind(record: DecisionRecord, closed_at: float) -> DecisionRecord:
     """Close a decision that an earlier run left open, with an unknown end.
 
     Args:
-        record: As the crash left it.
-        found: When this run found it (Unix s).
+        record: Its newest stored state.
+        closed_at: Time at which this run closes it (Unix s).
     """
+    # Unknown and not missing: the robot may have slowed after iVeg ended.
     links = [
         {**link, "verdict": "unknown"} if link["verdict"] == "open" else link
         for link in record.links
     ]
-    links.append(write_link(Link("interrupted", "unknown", found)))
-    return replace(record, ended_at=found, links=links)
+    links.append(write_link(Link("interrupted", "unknown", closed_at)))
+    return replace(record, ended_at=closed_at, links=links)
 
 
 def _parameters(rule: DetectionRule, zone: Zone) -> dict[str, object]:
@@ -94,6 +96,7 @@ def _parameters(rule: DetectionRule, zone: Zone) -> dict[str, object]:
     looks = None if sighting is None else sighting.looks
     return {
         **for_class(rule, zone.reason),
+        # Stored rows have this key.
         "ring_m": round(zone.radius_m, 3),
         "author": rule.author,
         "possible": sighting is not None and (sighting.possible or sighting.laser),
@@ -108,7 +111,7 @@ def _looks(looks: Looks) -> dict[str, object]:
 
 
 def write_link(link: Link) -> dict[str, object]:
-    """A link as it is stored."""
+    """Stored form of a link."""
     return {
         "link": link.name,
         "at": link.at,
@@ -118,31 +121,21 @@ def write_link(link: Link) -> dict[str, object]:
 
 
 def cause_of(report: SafetyReport, decisions: Decisions) -> ZoneEntry | None:
-    """The zone that a robot says it slows for, by the decision or the alert it names.
+    """Zone entry behind a robot's report, by the decision or alert that it names.
 
-    A robot judges alerts by its own pose, too.  Where it is ahead of iVeg it names the
-    alert, and there may be no decision yet.
+    A robot also judges alerts by its own pose.  Before iVeg has decided, it names the
+    alert, and no decision exists yet.
     """
     named = report.decision_id
     decision = decisions.get(named or "")
     if decision is not None:
         return decision.entry
-    for one in decisions.open:
-        zone = one.entry.zone
+    for decision in decisions.open:
+        entry, zone = decision.entry, decision.entry.zone
         is_named = zone.cause == report.cause or (named and zone.alert_id == named)
-        if is_named and one.entry.robot_id == report.robot_id:
-            return one.entry
+        if is_named and entry.robot_id == report.robot_id:
+            return entry
     return None
-
-
-def _first_of(
-    unmet: Iterable[ClearCondition], report: SafetyReport
-) -> ClearCondition | None:
-    """The unmet condition that a robot reports as its reason."""
-    reported = report.reason, report.cause
-    return next(
-        (one for one in unmet if (one.limit_reason, one.robot_id) == reported), None
-    )
 
 
 def speed_line(
@@ -150,12 +143,12 @@ def speed_line(
     entry: ZoneEntry | None,
     unmet: Iterable[ClearCondition] = (),
 ) -> LogEvent:
-    """A robot applies another factor than before, and why.
+    """Log line for a new speed factor of a robot, with its cause.
 
     Args:
-        report: What it applies.
-        entry: The zone that it slows for, where that is known.
-        unmet: Conditions of "clear" that do not hold; an old pose is like any old data.
+        report: The robot's report of the new factor.
+        entry: Zone entry behind it, where known.
+        unmet: Unmet conditions of "clear"; a pose keeps the sentence of its reason.
     """
     slots: dict[str, Slot] = {
         "robot": report.robot_id,
@@ -165,17 +158,22 @@ def speed_line(
     }
     if report.speed_factor >= FULL_SPEED:
         return LogEvent("speed", "log.speed_up", slots, report.robot_id)
-    lacks = _first_of(unmet, report)
-    if lacks is not None and lacks.reason != "pose":
-        slots["observer"] = lacks.robot_id
-        key = f"log.speed_down.{lacks.reason}"
+    key = f"log.speed_down.{report.reason}"
+    reported = report.reason, report.cause
+    matching = (
+        item for item in unmet if (item.limit_reason, item.robot_id) == reported
+    )
+    condition = next(matching, None)
+    if condition is not None and condition.reason != "pose":
+        slots["observer"] = condition.robot_id
+        key = f"log.speed_down.{condition.reason}"
         return LogEvent("speed", key, slots, report.robot_id)
     if entry is None or report.reason not in ("person", "robot"):
-        key = f"log.speed_down.{report.reason}"
         return LogEvent("speed", key, slots, report.robot_id)
     zone, confidence = entry.zone, _confidence(entry.zone.sighting)
-    is_walker = zone.reason == "person" and confidence is None
-    key = f"log.speed_down.{'walker' if is_walker else report.reason}"
+    if zone.reason == "person" and confidence is None:
+        # No camera has seen this person: the zone is that of a laser track.
+        key = "log.speed_down.walker"
     slots |= {
         "distance": round(entry.entered_m, 2),
         "observer": zone.observer,
@@ -186,6 +184,7 @@ def speed_line(
     }
     unseen_s = 0.0 if zone.sighting is None else zone.sighting.age_s(entry.entered)
     if unseen_s > LIMITS.growth_grace_s:
+        # A zone has grown from this age on, so its radius explains the slow-down.
         slots |= {"radius": round(zone.radius_m, 2), "unseen": round(unseen_s, 1)}
     return LogEvent(
         "speed",
@@ -198,13 +197,13 @@ def speed_line(
 
 
 def alert_line(step: str, alert: BookedAlert, **also: Slot) -> LogEvent:
-    """An alert was raised, cleared or acknowledged."""
+    """Log line for a step of an alert: raised, cleared or acknowledged."""
     condition, key = alert.condition, alert.condition.key
     slots = {**condition.slots, "alert": key, "priority": alert.priority, **also}
     return LogEvent("alert", f"log.alert.{step}", slots, condition.robot_id)
 
 
 def thing_line(key: str, thing: Thing, by: str) -> LogEvent:
-    """A line of the log: a mark was made, taken back, or is over."""
+    """Log line for a mark that was made, taken back or has expired."""
     place = {"x": round(thing.x, 2), "y": round(thing.y, 2)}
     return LogEvent("system", key, {"by": by, **place})

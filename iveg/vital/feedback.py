@@ -1,4 +1,4 @@
-"""Feedback to the fleet (Algorithm 2, line 13): one message for each observer."""
+"""Feedback to the fleet (Algorithm 2, line 12): one message for each observer."""
 
 from collections.abc import Iterable, Mapping
 
@@ -12,18 +12,18 @@ from iveg.domain.stamps import format_stamp
 from iveg.vital.core import Core
 
 MOST_ALERTS = 256
-"""A robot refuses feedback with more."""
+"""Most alerts in a feedback; a robot refuses more."""
 
 
 class FeedbackPublisher:
     """Writes the feedback and hands it to the fleet.
 
-    One count goes over all topics of a boot of iVeg, so that what a robot echoes names
-    one message (docs/interfaces/mqtt.md).
+    One ``seq`` counts over all topics of a boot of iVeg, so that a robot's echo names a
+    single message (docs/interfaces/mqtt.md).
 
     Args:
-        core: Whose fleet is told.
-        other: When each robot's newest confident object of another class came.
+        core: It has the world, the people and the fleet.
+        other: Receipt of each robot's newest confident object of another class.
     """
 
     def __init__(self, core: Core, other: Mapping[str, Instant]) -> None:
@@ -36,7 +36,7 @@ class FeedbackPublisher:
     def publish(
         self, speed_limits: Mapping[str, SpeedLimit], rule: DetectionRule, now: Instant
     ) -> None:
-        """Send every robot what the fleet must know."""
+        """Send every robot its feedback."""
         self.published_at = now.mono
         alerts = _newest(tuple(self._alerts(rule, now)))
         seen = {
@@ -46,7 +46,7 @@ class FeedbackPublisher:
         }
         robots = self._world.robots
         first, last = self._seq + 1, self._seq + len(robots)
-        # Before any robot has received it: a moment too early makes no age younger.
+        # Noted before any robot has it: a moment too early makes no age look younger.
         self._world.ledger.composed(self._boot, first, last, now.mono)
         for robot in robots.values():
             self._seq += 1
@@ -63,8 +63,9 @@ class FeedbackPublisher:
         rule: DetectionRule,
         now: Instant,
     ) -> Feedback:
-        mine = [one for one in alerts if one.observer == robot.robot_id]
-        newest = max(mine, key=lambda one: one.stamp, default=None)
+        own_alerts = [alert for alert in alerts if alert.observer == robot.robot_id]
+        newest = max(own_alerts, key=lambda alert: alert.stamp, default=None)
+        # Algorithm 2: any other confident class is only a time stamp.
         if newest is None and robot.robot_id in self._other:
             stamp = format_stamp(self._other[robot.robot_id].wall)
             newest = FeedbackAlert("", stamp)
@@ -87,7 +88,7 @@ class FeedbackPublisher:
     def _alerts(self, rule: DetectionRule, now: Instant) -> Iterable[FeedbackAlert]:
         for person in self._people.known.values():
             for sighting, radius in self._people.zone_radii(person, rule, now):
-                # What a recording saw long ago must not slow a robot of today.
+                # A recording saw somebody long ago, who must not slow a robot of today.
                 if self._world.robots[sighting.observer].is_replay:
                     continue
                 is_seen = sighting.age_s(now) <= LIMITS.seen_s
@@ -108,4 +109,4 @@ def _newest(alerts: tuple[FeedbackAlert, ...]) -> tuple[FeedbackAlert, ...]:
     """The newest alerts, as many as a robot reads; speed limits count all of them."""
     if len(alerts) <= MOST_ALERTS:
         return alerts
-    return tuple(sorted(alerts, key=lambda one: one.stamp)[-MOST_ALERTS:])
+    return tuple(sorted(alerts, key=lambda alert: alert.stamp)[-MOST_ALERTS:])

@@ -1,8 +1,8 @@
 """Health of the data path from robot to screen, hop by hop.
 
-Each hop is judged by what went through it, never by its own word: a probe measure goes
-out over MQTT every two seconds and must come back as a notification (docs/faults.md,
-F4).  The last place where it was seen tells which hop lost it::
+Each hop is judged by the messages that passed it, never by its own state: a probe
+measure goes out over MQTT every two seconds and must come back as a notification
+(docs/faults.md, F4).  The last place that it reached tells which hop lost it::
 
     broker confirms it    →  the broker lives
     it is stored at Orion →  the agent receives and Orion stores
@@ -22,22 +22,24 @@ HopState = Literal["ok", "late", "down", "unknown"]
 Earlier = Literal["known", "reading", "unknown"]
 
 PROBE_PERIOD_S = 2.0
+# Two probe periods; down is within the 6 s of docs/faults.md, F4.
 LATE_S, DOWN_S = 4.0, 5.5
 GRACE_S = 6.0
-"""For this long after the start no hop is reported as down."""
+"""Time after the start in which silence is not reported as down (s)."""
 EARLIER_GRACE_S = 2.0
-"""A history that has not told what earlier runs left by then is said to be missing."""
+"""Time after the start from which unread rows of earlier runs count as unknown (s)."""
+# A dead agent must be named, however slow it was before.
 _LONGEST_GAP_S = 30.0
 
 
 @dataclass(frozen=True, slots=True)
 class HopHealth:
-    """One hop's state and why.
+    """State of one hop, with its evidence.
 
     Attributes:
-        age_s: How old the evidence is (s).
+        age_s: Age of the evidence (s).
         detail: One short sentence.
-        lag_s: How late measures pass it (s); None where no probe tells.
+        lag_s: Delay of measures at it (s); None where no probe shows it.
     """
 
     name: Hop
@@ -51,24 +53,25 @@ class HealthMonitor:
     """Collects the evidence about each hop.
 
     Args:
-        start: When iVeg started.
-        database: The recorder's state.
+        start: Start of iVeg.
+        database: Reads the recorder's state.
 
     Attributes:
         mqtt_connected: Whether our own connection to the broker stands.
-        mqtt_error: Why the broker did not confirm the last probe.
-        orion_error: What the last question to Orion came to; empty when well.
-        orion_slow: That it answers, and how late.
-        agent_error: The same of the IoT Agent; ``agent_slow`` too.
-        agent_silent: That the agent takes questions and does not answer them.
-        agent_warning: What a person should look at though all seems well.
-        notify_error: What was wrong with the subscriptions when last looked at.
-        notify_detail: Why Orion could not deliver, as it remembers; may be long past.
-        received_at: When the newest probe came back (s, monotonic).
-        stored_at: When the newest probe that Orion has was sent (s, monotonic).
-        notified_at: When the newest notification of any kind came (s, monotonic).
-        probe: How far the whole chain is behind.
-        earlier_read: Whether what earlier runs left in the history is taken up.
+        mqtt_error: Reason why the broker did not confirm the last probe.
+        orion_error: Error of the last request to Orion; empty when well.
+        orion_slow: Delay of Orion's last answer, in words; empty when in time.
+        orion_ok_at: Newest answer of Orion without an error (s, monotonic).
+        agent_error: As ``orion_error``, of the IoT Agent; ``agent_slow`` likewise.
+        agent_silent: Set where the agent takes requests and does not answer them.
+        agent_warning: Advice to a person while all seems well.
+        notify_error: Fault of the subscriptions at the last check.
+        notify_detail: Orion's newest failure to deliver; may be long past.
+        received_at: Return of the newest probe (s, monotonic).
+        stored_at: Departure of the newest probe that Orion has (s, monotonic).
+        notified_at: Newest notification of any kind (s, monotonic).
+        probe: Lag of the whole chain.
+        earlier_read: Whether alerts and log of earlier runs have been read.
     """
 
     def __init__(self, start: Instant, database: Callable[[], HopState]) -> None:
@@ -90,29 +93,26 @@ class HealthMonitor:
 
     # --- the heartbeat probe --------------------------------------------------------
 
-    def sent(self, origin: Origin, now: Instant) -> None:
-        """A probe leaves."""
-        self.probe.sent(origin, now)
-
     def received(self, origin: Origin, now: Instant) -> None:
-        """A probe has come back as a notification."""
+        """Note that a probe came back as a notification."""
         if self.received_at is not None:
             self._gap_s = now.mono - self.received_at
         self.received_at = now.mono
         self.probe.returned(origin, now)
 
     def stored(self, origin: Origin) -> None:
-        """Orion has this probe; one of an earlier life of iVeg proves nothing."""
-        left = self.probe.sent_at(origin)
-        if left is not None:
-            self.stored_at = left
+        """Note that Orion has this probe; a probe of an earlier run proves nothing."""
+        sent_at = self.probe.sent_at(origin)
+        if sent_at is not None:
+            self.stored_at = sent_at
 
     # --- the verdict --------------------------------------------------------------
 
     def hops(self, now: Instant) -> list[HopHealth]:
-        """Every hop, in the order in which a datum passes them."""
+        """Health of every hop, in the order in which a datum passes them."""
         mqtt, orion = self._mqtt(now), self._orion(now)
         agent = self._agent(now, broken=mqtt.state == "down" or orion.state == "down")
+        # Behind a broken hop silence is no fault of the notifications.
         blind = orion.state == "down" or agent.state != "ok"
         return [
             mqtt,
@@ -123,7 +123,7 @@ class HealthMonitor:
         ]
 
     def earlier(self, now: Instant) -> Earlier:
-        """Whether alerts and log of earlier runs are known."""
+        """Whether alerts and log of earlier runs have been read."""
         if self.earlier_read:
             return "known"
         is_young = now.mono - self._start.mono < EARLIER_GRACE_S
@@ -136,7 +136,7 @@ class HealthMonitor:
         )
 
     def is_cut(self, now: Instant) -> bool:
-        """Whether it is known that Orion's commands do not reach the robots."""
+        """Whether a hop is down that Orion's commands pass on their way to robots."""
         down = {hop.name for hop in self.hops(now) if hop.state == "down"}
         return not down.isdisjoint((Hop.MQTT, Hop.AGENT))
 
@@ -157,9 +157,9 @@ class HealthMonitor:
         return HopHealth(Hop.ORION, "unknown" if age is None else "ok", age)
 
     def _agent(self, now: Instant, *, broken: bool) -> HopHealth:
-        """Deaf, overloaded or healthy: the probe knows, if the hops round it are well.
+        """Health of the agent; by the probe alone where the hops around it are well.
 
-        An agent that measures still pass is not down because it leaves requests
+        An agent that still passes measures is not down because it leaves requests
         unanswered: under load it answers them last.
         """
         age, state = self._passing(now)
@@ -175,17 +175,17 @@ class HealthMonitor:
         return HopHealth(Hop.AGENT, state, age, detail, lag)
 
     def _lag(self, now: Instant) -> float | None:
-        """Lag of the agent (s).
+        """Lag of the agent (s); None: unknown.
 
-        For a probe that Orion has and that did not come back, notifications are at
-        fault, and the lag of the agent is unknown.
+        If Orion has a probe that did not come back, the notifications are at fault and
+        the probe shows nothing of the agent.
         """
         if self.stored_at is not None and not self.probe.has_passed(self.stored_at):
             return None
         return self.probe.lag(now)
 
     def _agent_says(self, lag_s: float | None) -> tuple[HopState, str]:
-        """State of an agent that measures pass, with the lag first."""
+        """State of an agent that passes measures; the lag counts first."""
         if lag_s is not None and lag_s > SLOW_S:
             return "late", lag_in_words(lag_s)
         if self.agent_silent:
@@ -201,29 +201,29 @@ class HealthMonitor:
     def _agent_down_s(self) -> float:
         """Silence after which the agent counts as down and not merely behind (s).
 
-        Behind a backlog that grows, probes come back ever farther apart.
+        Behind a growing backlog, probes come back ever farther apart.
         """
         if not self._was_behind:
             return DOWN_S
         return min(_LONGEST_GAP_S, max(DOWN_S, 2 * self._gap_s))
 
     def is_overloaded(self, now: Instant) -> bool:
-        """Whether measures pass the agent late: nothing may be added to it."""
+        """Whether measures pass the agent late, so that nothing may add to its load."""
         _, state = self._passing(now)
         return state in ("ok", "late") and self._was_behind
 
     def _passing(self, now: Instant) -> tuple[float | None, HopState]:
-        """Age of the newest measure that passed the agent (s), and its verdict."""
-        passed = [at for at in (self.received_at, self.stored_at) if at is not None]
-        age = _age(max(passed, default=None), now)
+        """Age of the newest measure that passed the agent (s), and the state by it."""
+        moments = [at for at in (self.received_at, self.stored_at) if at is not None]
+        age = _age(max(moments, default=None), now)
         return age, self._by_age(age, now, self._agent_down_s)
 
     def _notifications(self, now: Instant, *, blind: bool) -> HopHealth:
         age = _age(self.notified_at, now)
         state = self._by_age(age, now)
         if state == "ok":
-            missed: HopState = "down" if self.notify_error else "ok"
-            return HopHealth(Hop.NOTIFICATIONS, missed, age, self.notify_error)
+            hop_state: HopState = "down" if self.notify_error else "ok"
+            return HopHealth(Hop.NOTIFICATIONS, hop_state, age, self.notify_error)
         if blind:
             return HopHealth(Hop.NOTIFICATIONS, "unknown", age)
         detail = self.notify_error or self.notify_detail

@@ -18,6 +18,7 @@ from iveg.domain.observations import (
     Received,
     kind_of,
 )
+from iveg.domain.stream_order import Freshness
 from iveg.vital import topics
 from iveg.vital.command import Commander
 from iveg.vital.core import Core
@@ -26,13 +27,15 @@ from iveg.vital.health_monitor import HopHealth, HopState
 from iveg.vital.ingest import Ingest
 
 TICK_S = 0.05
-"""Time passes, and the fleet is judged, at least so often (s)."""
+"""Period in which time passes for the world, and the fleet is judged (s)."""
 APART_S = 0.02
-"""After news the fleet is judged at once, but at most so often (s)."""
+"""Least time between two judgements; else news are judged at once (s)."""
 _SHARE = 8
-"""Taking has seven times as long as judging, so that nothing waits for its turn."""
+"""Judging takes an eighth of the time at most, so that messages do not pile up."""
+# A timer may wake a little early, which must not cost a second turn.
 _EARLY_S = 0.001
 _ANSWERS = (CommandAnswer, GoalAnswer)
+_TWINS: tuple[Freshness, ...] = ("duplicate", "late")
 _HEALTH_PERIOD_S = 1.0
 
 
@@ -55,11 +58,11 @@ class RuleLoop:
         self._broken: set[str] = set()
 
     async def run(self) -> None:
-        """Until cancelled; the only loop."""
+        """Run until cancelled; the only loop."""
         while True:
             await self._ingest.wait(max(0.0, self._due_at - self._clock().mono))
             self.take(self._ingest.drain())
-            # Pages are sent what was taken before the fleet is judged by it.
+            # Yield, so that pages are sent the news before the fleet is judged by them.
             await asyncio.sleep(0)
             now = self._clock()
             if now.mono >= self._due_at:
@@ -68,12 +71,11 @@ class RuleLoop:
 
     @property
     def _due_at(self) -> float:
-        """When the fleet is judged next (monotonic, s)."""
+        """Moment of the next judgement (monotonic, s)."""
         ticks_at = self._ticked + TICK_S - _EARLY_S
         if not self._evaluator.is_unjudged:
             return ticks_at
-        apart_s = max(APART_S, _SHARE * self._took_s)
-        return min(ticks_at, self._judged + apart_s)
+        return min(ticks_at, self._judged + max(APART_S, _SHARE * self._took_s))
 
     def step(self, arrived: Iterable[Received], now: Instant) -> None:
         """Take everything that arrived, and judge the fleet."""
@@ -81,9 +83,9 @@ class RuleLoop:
         self.judge(now)
 
     def take(self, arrived: Iterable[Received]) -> None:
-        """Take facts; the next judgement draws what follows from them."""
+        """Take everything that arrived; the next judgement counts it."""
         for received in arrived:
-            self._hear(received)
+            self._take_in(received)
 
     def judge(self, now: Instant) -> None:
         """Judge the fleet once for all that was taken; let time pass if it is due."""
@@ -101,20 +103,20 @@ class RuleLoop:
             self._watch_chain(now)
             self._supervision.tell("ticked", now)
 
-    def _hear(self, received: Received) -> None:
-        fresh = self._apply(received)
-        if fresh:
+    def _take_in(self, received: Received) -> None:
+        freshness = self._apply(received)
+        if freshness == "new":
             self._taken.append(received)
         if isinstance(received.observation, HeartbeatProbe):
             self._health_monitor.received(received.observation.origin, received.at)
-        # The second transport's answer is no news, but its time is kept.
-        if not fresh and not isinstance(received.observation, _ANSWERS):
-            return
-        if self._evaluator.world.may_act(received):
+        # The second transport's answer changes nothing, but its time is kept.
+        is_twin = isinstance(received.observation, _ANSWERS) and freshness in _TWINS
+        if (freshness == "new" or is_twin) and self._evaluator.world.may_act(received):
             self._act(received)
 
     def _tick(self, now: Instant) -> None:
         """Let time pass for what is vital; the fleet is judged with it."""
+        # STOP goes first: its deadlines wait for nothing else.
         self._commander.tick(now)
         self._evaluator.age(now)
         commanded = self._commander.conditions(now)
@@ -122,7 +124,7 @@ class RuleLoop:
         self._evaluator.tick(now, chain(commanded, supervised))
 
     def _act(self, received: Received) -> None:
-        """Hand an observation to whoever follows an order."""
+        """Hand an observation to the part whose order it answers."""
         observation = received.observation
         if isinstance(observation, GoalAnswer):
             facts = observation, received.at, received.transport
@@ -133,10 +135,11 @@ class RuleLoop:
             motion = UNMOVED if robot is None else robot.motion(received.at)
             self._commander.apply(received, world.age_then(received), motion)
 
-    def _apply(self, received: Received) -> bool:
-        """Whether it became part of the state.
+    def _apply(self, received: Received) -> Freshness:
+        """Apply an observation.
 
-        What only comfort reads is refused where it fails, and hurts no neighbour.
+        An observation that only comfort reads is refused where it fails, so that it
+        harms no other.
         """
         observation = received.observation
         try:
@@ -144,22 +147,21 @@ class RuleLoop:
         except Exception as error:
             if kind(observation).vital:
                 raise
-            source, of = observation.robot_id or "?", kind_of(observation)
-            self._ingest.reject(source, f"unusable_{of.__name__}", repr(error))
-            return False
+            source, name = observation.robot_id or "?", kind_of(observation).__name__
+            self._ingest.reject(source, f"unusable_{name}", repr(error))
+            return "refused"
 
     def _watch_chain(self, now: Instant) -> None:
         hops = self._health_monitor.hops(now)
         for hop in hops:
             self._log_change(hop, now)
         before, self._states = self._states, {hop.name: hop.state for hop in hops}
-        overdue = now.mono - self._health_at >= _HEALTH_PERIOD_S
-        if overdue or self._states != before:
+        if now.mono - self._health_at >= _HEALTH_PERIOD_S or self._states != before:
             self._health_at = now.mono
             self._event_log.changed(topics.HEALTH.name)
 
     def _log_change(self, hop: HopHealth, now: Instant) -> None:
-        """A loss once, and its end once; what is merely late or unknown is neither."""
+        """Log a hop's loss and its end once each; a late or unknown hop is neither."""
         if hop.state == "down" and hop.name not in self._broken:
             self._broken.add(hop.name)
             key = "log.hop.down"

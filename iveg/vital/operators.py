@@ -1,10 +1,10 @@
-"""Choices of operators that count at once and are logged: rule, detectors, marks.
+"""Choices of operators, in force at once and logged: rule, detectors, marks.
 
-A new rule, a detector out of service and an answer to a word are on disk first.  A
-detector out of service lifts a requirement of the claim "clear" (docs/safety.md,
-"Clear"), as nothing else does; that ends with the robot's next boot at the latest.  A
-mark, "not a person here", lasts until the end of the day, until somebody takes it back
-or until iVeg's next start, whichever is first: forgetting one protects.
+A new rule, a detector out of service and an answer to a word are on disk first.  Only
+a detector out of service lifts a requirement of "clear" (docs/safety.md, "Clear"),
+until the robot's next boot at the latest.  A mark, "not a person here", lasts until the
+end of the day, until somebody takes it back or until iVeg's next start, whichever is
+first: a forgotten mark protects.
 """
 
 import asyncio
@@ -13,13 +13,12 @@ from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.detector import OutOfService
+from iveg.domain.detector import OutOfService, WordAnswer
 from iveg.domain.errors import MarkRefusedError, OutdatedError, UnknownNameError
-from iveg.domain.events import LogEvent, Slot
+from iveg.domain.events import LogEvent
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
-from iveg.domain.tracking.person import LONGEST_S, MOST_THINGS, Thing
-from iveg.domain.words import WordAnswer
+from iveg.domain.tracking.things import LONGEST_S, MOST_THINGS, Thing
 from iveg.vital import topics
 from iveg.vital.core import Core
 from iveg.vital.evaluate import Evaluator
@@ -33,9 +32,8 @@ class Kept(Generic[_T]):
     """A choice that outlives a restart.
 
     Attributes:
-        value: As the last run left it.
-        save: Writes another in its place; returns when it is on disk, or raises
-            HopError.
+        value: Choice of the last run.
+        save: Replaces it; returns when the new value is on disk, or raises HopError.
     """
 
     value: _T
@@ -48,9 +46,9 @@ class KeptChoices:
 
     Attributes:
         rules: Every version of the rule, oldest first; the last is in force.
-        append_rule: Writes one more, as ``Kept.save`` does.
-        out_of_service: Detectors that nobody waits for, by robot.
-        words: What operators said of words of detectors.
+        append_rule: Writes a new version, as ``Kept.save`` does.
+        out_of_service: Detectors out of service, by robot.
+        words: Operators' answers to words of detectors.
     """
 
     rules: Sequence[DetectionRule]
@@ -60,7 +58,7 @@ class KeptChoices:
 
 
 class Rules:
-    """The versions of the rule; the newest is the one in force.
+    """Versions of the rule; the newest is in force.
 
     Attributes:
         versions: All of them, oldest first.
@@ -69,7 +67,8 @@ class Rules:
     def __init__(self, core: Core, evaluator: Evaluator, kept: KeptChoices) -> None:
         self._evaluator, self._event_log = evaluator, core.event_log
         self._append = kept.append_rule
-        self._one_by_one = asyncio.Lock()
+        # One change at a time: each takes the number after the version in force.
+        self._lock = asyncio.Lock()
         self.versions = list(kept.rules)
 
     @property
@@ -83,16 +82,16 @@ class Rules:
         """Put new parameters in force under the next version.
 
         Args:
-            wanted: The parameters; its version, author and time are not looked at.
-            by: Who wants it.
-            at: When.
-            seen: The version that they have changed; None does not ask.
+            wanted: The parameters; its version, author and time are ignored.
+            by: Name of the operator.
+            at: Time of the change.
+            seen: Version that the operator has edited; None skips the check.
 
         Raises:
-            OutdatedError: somebody else was faster.
-            HopError: it could not be written down; the old version stays in force.
+            OutdatedError: another version is in force by now.
+            HopError: it could not be written; the old version stays in force.
         """
-        async with self._one_by_one:
+        async with self._lock:
             before = self.current
             if seen is not None and seen != before.version:
                 raise OutdatedError("The rule", seen, before.version)
@@ -103,11 +102,17 @@ class Rules:
                 author=by,
                 since=at.wall,
             )
+            # On disk first: a restart must not bring a replaced rule back into force.
             await self._append(rule)
             self._evaluator.rule = rule
             self.versions.append(rule)
-        facts: dict[str, Slot] = {"by": by, "version": rule.version}
-        self._event_log.rule(LogEvent("system", "log.rule_changed", facts), at)
+        self._event_log.log(
+            LogEvent("system", "log.rule_changed", {"by": by, "version": rule.version}),
+            at,
+        )
+        # People's zones have the rule's radii, so pages must draw them anew.
+        for topic in (topics.RULE, topics.PEOPLE):
+            self._event_log.changed(topic.name)
         return rule
 
 
@@ -117,10 +122,11 @@ class Detectors:
     def __init__(self, core: Core, kept: KeptChoices) -> None:
         self._world, self._event_log = core.world, core.event_log
         self._save_out, self._save_words = kept.out_of_service.save, kept.words.save
-        self._one_by_one = asyncio.Lock()
-        for robot_id, word in kept.out_of_service.value.items():
+        self._lock = asyncio.Lock()
+        for robot_id, entry in kept.out_of_service.value.items():
+            # A robot may have left the fleet since.
             if robot_id in core.world.robots:
-                core.world.robots[robot_id].detector.out_of_service = word
+                core.world.robots[robot_id].detector.out_of_service = entry
         for answer in kept.words.value.values():
             core.world.word_answers.add(answer)
 
@@ -137,56 +143,55 @@ class Detectors:
 
         Raises:
             UnknownRobotError: not in the fleet.
-            HopError: it could not be written down; nothing has changed.
+            HopError: it could not be written; nothing has changed.
         """
         robot = self._world.robot(robot_id)
-        async with self._one_by_one:
+        async with self._lock:
+            # Another boot of the robot ends it (docs/safety.md, "Clear").
             boot = _boot_of(robot)
-            word = None if in_service else OutOfService(by, at.wall, boot, reason)
-            out = self._out_of_service() | {robot_id: word}
-            await self._save_out({name: one for name, one in out.items() if one})
-            robot.detector.out_of_service = word
+            entry = None if in_service else OutOfService(by, at.wall, boot, reason)
+            robots = self._world.robots.values()
+            out = {other.robot_id: other.detector.out_of_service for other in robots}
+            out[robot_id] = entry
+            await self._save_out({name: kept for name, kept in out.items() if kept})
+            robot.detector.out_of_service = entry
         key = "log.detector_in" if in_service else "log.detector_out"
         slots = {"robot": robot_id, "by": by}
-        if word is not None:
+        if entry is not None:
             slots["reason"] = reason
         self._event_log.log(LogEvent("system", key, slots, robot_id), at)
-        self._event_log.changed(topics.ROBOT.of(robot_id))
+        self._event_log.changed(topics.ROBOT.for_id(robot_id))
         return robot
 
     async def answer(self, answer: WordAnswer, at: Instant) -> None:
-        """Take an answer to a word that was asked for, or another one in its place.
+        """Take an answer to an unknown word, or a new answer to an answered one.
 
         Raises:
-            UnknownNameError: nobody asked.
-            HopError: it could not be written down; nothing has changed.
+            UnknownNameError: the word is neither unknown nor answered.
+            HopError: it could not be written; nothing has changed.
         """
         detector, word, answers = answer.detector, answer.word, self._world.word_answers
-        heard = [
+        vocabularies = [
             robot.detector.words[detector]
             for robot in self._world.robots.values()
             if detector in robot.detector.words
         ]
-        is_asked = any(word in one.unknown for one in heard)
-        if not is_asked and (detector, word) not in answers.known:
+        is_unknown = any(word in words.unknown for words in vocabularies)
+        if not is_unknown and (detector, word) not in answers.known:
             raise UnknownNameError("word", word)
-        async with self._one_by_one:
-            every = answers.known | {(detector, word): answer}
-            await self._save_words({"/".join(key): one for key, one in every.items()})
+        async with self._lock:
+            known = answers.known | {(detector, word): answer}
+            await self._save_words({"/".join(key): kept for key, kept in known.items()})
             answers.add(answer)
-        for one in heard:
-            one.unknown.pop(word, None)
+        for words in vocabularies:
+            words.unknown.pop(word, None)
         key = "log.word_person" if answer.is_person else "log.word_harmless"
         slots = {"word": word, "detector": detector, "by": answer.by}
         self._event_log.log(LogEvent("system", key, slots), at)
 
-    def _out_of_service(self) -> dict[str, OutOfService | None]:
-        robots = self._world.robots.values()
-        return {robot.robot_id: robot.detector.out_of_service for robot in robots}
-
 
 def _boot_of(robot: RobotState) -> str | None:
-    """The boot that the robot spoke of last."""
+    """Newest boot that the robot has reported."""
     newest = robot.odometry or robot.safety or robot.frame
     return None if newest is None else newest.origin.boot
 
@@ -205,7 +210,7 @@ class ThingMarks:
         return [*self._things.known.values()]
 
     def mark(self, person_id: str, by: str, until: float, at: Instant) -> Thing:
-        """Mark where a track is; ``until`` when at the latest (Unix s).
+        """Mark the place of a track until ``until`` (Unix s) at the latest.
 
         Raises:
             UnknownNameError: no such track.
@@ -219,6 +224,7 @@ class ThingMarks:
         lasts_s = min(LONGEST_S, until - at.wall)
         end = Instant(wall=at.wall + lasts_s, mono=at.mono + lasts_s)
         thing = Thing(f"T{self._marked + 1}", *person.middle, by, at, end)
+        # A mark hides its track from the rule, so it must not fit a possible person.
         if not thing.explains(person):
             raise MarkRefusedError("somebody")
         self._marked += 1

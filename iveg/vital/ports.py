@@ -1,4 +1,4 @@
-"""Ports of the pipeline to the outside, a few verbs each."""
+"""Ports of the pipeline to the outside."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ Ids = Callable[[], str]
 
 
 class CommandPort(Protocol):
-    """A transport's port for orders; an answer of 2xx or a PUBACK is no evidence.
+    """Port of a transport for orders; a 2xx or PUBACK proves nothing of a robot.
 
     A release, resume or goal is sent once: never retained, never sent again.
     """
@@ -75,7 +75,7 @@ class FleetPort(Protocol):
 
 
 class StopJournal(Protocol):
-    """Append-only file that outlives a crash and a lost database."""
+    """Append-only file of desired states; outlives a crash and a lost database."""
 
     async def log_desired(
         self,
@@ -88,10 +88,10 @@ class StopJournal(Protocol):
         named: Sequence[str] = (),
         challenge: str | None = None,
     ) -> None:
-        """Write a robot's desired state down; returns when it is on disk.
+        """Write a robot's desired state; returns when it is on disk.
 
         ``named``: STOPs that a release is about to name, with its ``challenge``.  The
-        robot is still to stand: only a desired state of ``run`` ends that.
+        robot must still stand: only a desired state of ``run`` ends that.
         """
 
 

@@ -13,20 +13,23 @@ from iveg.vital.topics import is_telemetry
 from iveg.vital.waiting import wait_set
 
 MAX_PENDING = 1000
-_Waits = TypeVar("_Waits")
+_Item = TypeVar("_Item")
 
 
 class Subscriber:
     """Changes that one browser has not been sent yet.
 
     Attributes:
-        dirty: State topics that changed and are sent at once, longest waiting first.
-        telemetry: The same of those whose sending is paced.
+        dirty: Changed state topics to send at once, longest waiting first.
+        telemetry: Changed state topics whose sending is paced, likewise ordered.
+        pending: Events, oldest first.
         wants_telemetry: False while no telemetry could be sent: a change is noted and
             wakes nobody.
+        overflowed: Whether events were lost, so that the browser needs a snapshot.
     """
 
     def __init__(self) -> None:
+        # Dicts as sets that keep their order.
         self.dirty: dict[str, None] = {}
         self.telemetry: dict[str, None] = {}
         self.pending: deque[tuple[str, object]] = deque()
@@ -49,7 +52,8 @@ class Subscriber:
             self.wake()
 
     def append(self, topic: str, item: object) -> None:
-        """Queue an event, which is never dropped."""
+        """Queue an event; a full queue sends the browser back for a snapshot."""
+        # No event may be lost: the snapshot holds the events that are not queued.
         if len(self.pending) >= MAX_PENDING:
             self.overflowed = True
         else:
@@ -57,26 +61,15 @@ class Subscriber:
         self.wake()
 
     async def news(self, within_s: float | None = None) -> None:
-        """Wait until there may be something to take, or for that long (s)."""
+        """Wait until there may be something to take, at most ``within_s`` (s)."""
         await wait_set(self._awake, within_s)
 
-    def drain_events(self) -> list[tuple[str, object]]:
-        """Every event since the last time, in order."""
-        return _taken(self.pending)
 
-    def drain_topics(self) -> list[str]:
-        """The topics that changed and are sent at once."""
-        return _taken(self.dirty)
-
-    def drain_telemetry(self) -> list[str]:
-        """The topics that changed and are paced."""
-        return _taken(self.telemetry)
-
-
-def _taken(waiting: dict[_Waits, None] | deque[_Waits]) -> list[_Waits]:
-    taken = list(waiting)
+def drain(waiting: dict[_Item, None] | deque[_Item]) -> list[_Item]:
+    """Take everything that waits, in its order."""
+    items = list(waiting)
     waiting.clear()
-    return taken
+    return items
 
 
 class Hub:
@@ -84,30 +77,25 @@ class Hub:
 
     def __init__(self) -> None:
         self.versions: Counter[str] = Counter()
-        self._subscribers: set[Subscriber] = set()
-
-    @property
-    def watchers(self) -> int:
-        """Number of connected browsers."""
-        return len(self._subscribers)
+        self.subscribers: set[Subscriber] = set()
 
     def join(self) -> Subscriber:
         """Add a browser."""
         subscriber = Subscriber()
-        self._subscribers.add(subscriber)
+        self.subscribers.add(subscriber)
         return subscriber
 
     def leave(self, subscriber: Subscriber) -> None:
         """Remove a browser."""
-        self._subscribers.discard(subscriber)
+        self.subscribers.discard(subscriber)
 
     def changed(self, topic: str) -> None:
         """Mark a state topic as changed."""
         self.versions[topic] += 1
-        for subscriber in self._subscribers:
+        for subscriber in self.subscribers:
             subscriber.changed(topic)
 
     def append(self, topic: str, item: object) -> None:
-        """Queue an event for every browser; none is dropped."""
-        for subscriber in self._subscribers:
+        """Queue an event for every browser."""
+        for subscriber in self.subscribers:
             subscriber.append(topic, item)

@@ -1,4 +1,4 @@
-"""Records on their way to the history, and which of them give way under pressure.
+"""Queue of records on their way to the history.
 
 The queue is bounded: the oldest telemetry gives way first, then the oldest of all but
 orders, and is counted.
@@ -31,8 +31,8 @@ class Waiting:
     """A queued record.
 
     Attributes:
-        revision: Grows with every record; of two states of one thing the higher counts.
-        since: When it was offered, monotonic seconds.
+        revision: Rises with every record; of two states of a row the higher counts.
+        since: Time at which it was offered (monotonic, s).
     """
 
     record: Record
@@ -60,7 +60,7 @@ class RecordQueue:
         return sum(map(len, self._lanes))
 
     def enqueue(self, waiting: Waiting) -> None:
-        """Append a record; a full queue lets go of its oldest."""
+        """Append a record; a full queue drops an older one."""
         self._lane(waiting).append(waiting)
         self._make_room()
 
@@ -73,13 +73,14 @@ class RecordQueue:
         return batch
 
     def put_back(self, batch: Sequence[Waiting]) -> None:
-        """Return what was taken and could not be stored, to where it stood."""
+        """Put records that could not be stored back in front, in their order."""
+        # Reversed, so that the first record of the batch is the first again.
         for waiting in reversed(batch):
             self._lane(waiting).appendleft(waiting)
         self._make_room()
 
     def oldest_since(self) -> float | None:
-        """When the record that has waited longest was offered; None when empty."""
+        """Offer time of the record that has waited longest; None when empty."""
         return min((lane[0].since for lane in self._lanes if lane), default=None)
 
     def _lane(self, waiting: Waiting) -> deque[Waiting]:
@@ -88,6 +89,7 @@ class RecordQueue:
         return self._telemetry if is_telemetry(waiting.record) else self._kept
 
     def _make_room(self) -> None:
+        # Orders never give way: a queue of orders alone may exceed its capacity.
         while len(self) > self._capacity and (self._telemetry or self._kept):
             (self._telemetry or self._kept).popleft()
             self.dropped += 1

@@ -17,7 +17,7 @@ class Staleness:
         self._links: dict[str, Link] = {}
 
     def tick(self, now: Instant) -> None:
-        """Log links that changed and marks that are over, and forget people."""
+        """Log changed links and expired marks, and forget people."""
         for robot in self._world.robots.values():
             self._watch_link(robot, now)
         people = self._people
@@ -29,13 +29,12 @@ class Staleness:
 
     def _watch_link(self, robot: RobotState, now: Instant) -> None:
         link = robot.link(now)
-        before = self._links.get(robot.robot_id, "UNKNOWN")
-        if link == before:
+        if link == self._links.get(robot.robot_id, "UNKNOWN"):
             return
         self._links[robot.robot_id] = link
-        self._event_log.changed(topics.ROBOT.of(robot.robot_id))
+        self._event_log.changed(topics.ROBOT.for_id(robot.robot_id))
         if link == "UNKNOWN":
-            # For as long as it takes to prove an age; if that fails, it is LOST.
+            # UNKNOWN lasts until an age is proven, and becomes LOST where none is.
             return
         age, slots = robot.age_s(now), dict[str, Slot](robot=robot.robot_id)
         key = "log.link.unproven" if age is None else f"log.link.{link.lower()}"

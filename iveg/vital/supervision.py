@@ -1,9 +1,9 @@
-"""Keeps comfort away from what is vital: a part that fails is named and comes back.
+"""Supervision of comfort: a part that fails is named, restarted and harms no STOP.
 
 Vital is what a STOP or a speed limit needs; everything else is comfort
-(docs/architecture.md, "Vital and comfort").  Vital code never imports comfort: it tells
-an event, and whoever listens is guarded here, so that no drawing, statistic or row of
-the history can end a STOP::
+(docs/architecture.md, "Vital and comfort").  Vital code never imports comfort: it
+publishes events, and their listeners are guarded here, so that no drawing, statistic or
+row of the history can end a STOP::
 
     runs ── fails ──> down, P3 ── after a pause that doubles ──> runs
 """
@@ -11,22 +11,23 @@ the history can end a STOP::
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Callable, Coroutine, Iterable, Mapping
 from itertools import chain
 
 from iveg.domain.alerts import SHOWN_S
-from iveg.domain.events import Condition, Slot
-from iveg.domain.observations import (
-    Instant,
-)
+from iveg.domain.errors import VitalPartError
+from iveg.domain.events import Condition
+from iveg.domain.observations import Instant
 
 _log = logging.getLogger(__name__)
+Work = Callable[[], Coroutine[object, object, object]]
 
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 60.0
-"""Between the first failure of a part and its restart, and at most."""
+"""Pause before the first restart of a part, and the longest pause (s)."""
 LONGEST_TURN_S = 0.25
-"""CPU that one turn of the loop may take; more delays STOP and feedback."""
-
+"""CPU time that one turn of the loop may take (s); more delays STOP and feedback."""
+LAST_WORD_S = 0.5
+"""Time limit of the last feedback (s); 0.5 s later robots slow by themselves."""
 
 EVENTS = (
     "measured",
@@ -44,31 +45,31 @@ EVENTS = (
     "changed",
     "appended",
 )
-"""Events that vital code tells, with the facts that a listener is given.
+"""Events of vital code, with the arguments of a listener.
 
 - ``measured(topic, payload, at)``: a robot's own message was read
 - ``notified(body, at)``: a notification was read
-- ``entity_read(EntityReading, at)``: Orion said something of other equipment
+- ``entity_read(EntityReading, at)``: Orion sent values of other equipment
 - ``arrived(Received)``: a copy of a message of the fleet came, by either transport
 - ``frame_taken(DetectionFrame, sighted, at)``: a detection frame is judged
-- ``obstacle_reported(SafetyReport, at)``: a robot of today reported what its laser sees
+- ``obstacle_reported(SafetyReport, at)``: a live robot reported an obstacle
 - ``goal_answered(GoalAnswer, at, TransportId)``
-- ``aged(now)``: time has passed for the world, which is not judged yet
+- ``aged(now)``: the world has aged and is not judged yet
 - ``judged(DetectionRule, limits, changes, now)``
-- ``decided(received, now)``: a judgement is over, and this is what it was made of
+- ``decided(received, now)``: a judgement is over; it rests on these messages
 - ``ticked(now)``
 - ``raised(alerts)``
 - ``changed(topic)``: a live topic has changed
-- ``appended(topic, item)``: a live topic has a new item, which every browser is sent
+- ``appended(topic, item)``: a live topic has a new item for every browser
 """
 
 
 class Supervision:
-    """Comfort parts by name: what failed when, and what holds up the loop.
+    """Record of failed comfort parts, and of long turns of the loop.
 
     Args:
         clock: Reads both clocks.
-        first_pause_s: Before the first restart of a part.
+        first_pause_s: Pause before the first restart of a part (s).
 
     Attributes:
         counters: Failures by part, and long turns, since the start.
@@ -87,11 +88,11 @@ class Supervision:
         self._stopped: set[str] = set()
         """Parts that wait for their restart."""
         self._long_turn = float("-inf"), 0.0
-        """When the newest long turn ended (monotonic, s), and its CPU (s)."""
-        self._found: dict[str, tuple[Condition, ...]] = {}
+        """End of the newest long turn (monotonic, s), and its CPU time (s)."""
+        self._reported: dict[str, tuple[Condition, ...]] = {}
 
     def listen(self, part: str, **calls: Callable[..., object]) -> None:
-        """Have a part of comfort told of these events, after all who listen already.
+        """Register a part of comfort for events, after the earlier listeners.
 
         Raises:
             KeyError: there is no such event.
@@ -100,29 +101,59 @@ class Supervision:
             self._listeners[event].append((part, call))
 
     def tell(self, event: str, *facts: object) -> None:
-        """Tell an event; a listener that fails fails alone."""
+        """Publish an event; a failing listener stops neither caller nor others."""
         for part, call in self._listeners[event]:
             self.guard(part, call, *facts)
 
     def guard(self, part: str, call: Callable[..., object], *facts: object) -> None:
-        """Call a part of comfort, whose failure is not its caller's."""
+        """Call a part of comfort; its failure is counted and goes no further."""
+        # Exception alone: a cancellation must reach its task.
         try:
             call(*facts)
         except Exception as error:
             self.failed(part, error)
 
     def failed(self, part: str, error: BaseException) -> None:
-        """Count a failure of a part; logged once, until the part is well again."""
+        """Count a failure of a part; logs the first until the part is well again."""
         now = self._clock()
         self.counters[f"comfort_failed.{part}"] += 1
         if not self._is_down(part, now):
-            _log.error("%s has failed; what is vital goes on", part, exc_info=error)
+            _log.error(
+                "%s has failed; STOP and speed limits go on", part, exc_info=error
+            )
         self._failed_at[part] = now.mono
 
-    async def keep_running(
-        self, part: str, work: Callable[[], Awaitable[object]]
+    async def run(
+        self, vital: Mapping[str, Work], comfort: Mapping[str, Work], last_word: Work
     ) -> None:
-        """Run a part until it returns; after each failure again, ever later."""
+        """Run all parts until cancelled.
+
+        Args:
+            vital: Vital parts by name; none may end.
+            comfort: Parts of comfort by name; each is started again when it fails.
+            last_word: Sends the last feedback when a vital part has ended.
+
+        Raises:
+            VitalPartError: a vital part has ended.
+        """
+        tasks = [asyncio.create_task(work(), name=name) for name, work in vital.items()]
+        beside = [
+            asyncio.create_task(self.keep_running(name, work), name=name)
+            for name, work in comfort.items()
+        ]
+        try:
+            ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            # Before the other parts are cancelled: the link must send it.
+            await _say(last_word)
+            task = ended.pop()
+            raise VitalPartError(task.get_name()) from task.exception()
+        finally:
+            for task in (*tasks, *beside):
+                task.cancel()
+            await asyncio.gather(*tasks, *beside, return_exceptions=True)
+
+    async def keep_running(self, part: str, work: Work) -> None:
+        """Run a part until it returns; restart it after failures, ever later."""
         pause_s = self._first_pause_s
         while True:
             began = self._clock().mono
@@ -131,6 +162,7 @@ class Supervision:
                 return
             except Exception as error:
                 self.failed(part, error)
+            # A long run was a sound one: the part starts again with the short pause.
             if self._clock().mono - began > LONGEST_PAUSE_S:
                 pause_s = self._first_pause_s
             self._stopped.add(part)
@@ -138,32 +170,39 @@ class Supervision:
             self._stopped.discard(part)
             pause_s = min(LONGEST_PAUSE_S, 2.0 * pause_s)
 
-    def report(self, part: str, wrong: Iterable[Condition]) -> None:
-        """Take the conditions of a part in the place of its earlier ones."""
-        self._found[part] = tuple(wrong)
+    def report(self, part: str, conditions: Iterable[Condition]) -> None:
+        """Replace the conditions that a part reports."""
+        self._reported[part] = tuple(conditions)
 
     def note_turn(self, cpu_s: float) -> None:
-        """One turn of the loop is over, which took so much CPU (s)."""
+        """Note the CPU time of a turn of the loop (s)."""
         if cpu_s > LONGEST_TURN_S:
             self.counters["long_turn"] += 1
             self._long_turn = self._clock().mono, cpu_s
 
     def conditions(self, now: Instant) -> Iterable[Condition]:
-        """A P3 for each part that is down, a P2 while the loop was held up.
-
-        Beside them, what parts have reported.
-        """
-        yield from chain.from_iterable(self._found.values())
+        """Conditions of parts, a P3 for a part that is down, a P2 for a long turn."""
+        yield from chain.from_iterable(self._reported.values())
         for part in self._failed_at:
             if self._is_down(part, now):
-                yield Condition("P3", "alert.part_down", part, None, {"part": part})
+                yield Condition.filled("P3", "alert.part_down", part, part=part)
         ended_at, cpu_s = self._long_turn
         if now.mono - ended_at < SHOWN_S:
-            slots: dict[str, Slot] = {"ms": round(1000.0 * cpu_s)}
-            yield Condition("P2", "alert.loop_held_up", "loop", None, slots)
+            yield Condition.filled(
+                "P2", "alert.loop_held_up", "loop", ms=round(1000.0 * cpu_s)
+            )
 
     def _is_down(self, part: str, now: Instant) -> bool:
-        """Whether it waits for its restart, or failed so recently that it may again."""
+        """Whether a part waits for its restart or has failed within ``SHOWN_S``."""
         failed_at = self._failed_at.get(part)
         recent = failed_at is not None and now.mono - failed_at < SHOWN_S
         return recent or part in self._stopped
+
+
+async def _say(last_word: Work) -> None:
+    try:
+        async with asyncio.timeout(LAST_WORD_S):
+            await last_word()
+    except Exception:
+        # The link that sends it may be the part that has failed.
+        _log.exception("the last feedback failed; robots slow by themselves")

@@ -1,8 +1,8 @@
-"""The live topics: name, model and source of each.
+"""Live topics: name, model and source of each.
 
 This table is the only place that spells a topic.  Vital parts name changed topics by
-it (``ROBOT.of("AGI")``), ``/live`` reads and paces by it, and the snapshot is the table
-read once.  Events are each sent; of states the newest is.
+it (``ROBOT.for_id("AGI")``), ``/live`` reads and paces by it, and the snapshot is the
+table read once.  Every event is sent; of a state only the newest value.
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ from iveg.models.rule import Rule
 from iveg.models.snapshot import Climate, Tile
 
 Pace = Literal["at once", "frame", "read-out", "picture"]
-"""At once, past all telemetry; in each frame; as digits are read; as pictures are."""
+"""Pace: at once, before all telemetry; each frame; as digits; as pictures."""
 
 
 StateReader = Any
@@ -34,11 +34,11 @@ class Topic:
 
     Attributes:
         name: As docs/interfaces/live.md writes it; ``{id}`` is the key.
-        model: What its data are; None for what concerns one connection alone.
-        tell: The data of an event.
-        member: Its place in the snapshot.
-        read: What stands there, which a topic told at once tells again as it changes.
-        pace: How often a browser is told of it.
+        model: Type of its data; None for topics of a single connection.
+        tell: Makes the data of an event from its item.
+        member: Its member of the snapshot.
+        read: Reads that member; a state sent at once is read again on each change.
+        pace: Pace at which a browser is sent it.
     """
 
     name: str
@@ -48,8 +48,8 @@ class Topic:
     read: Callable[[StateReader, Instant], Any] | None = None
     pace: Pace = "at once"
 
-    def of(self, key: str) -> str:
-        """The topic of one robot or command."""
+    def for_id(self, key: str) -> str:
+        """Topic of the robot or command with this id."""
         return self.name.replace("{id}", key)
 
 
@@ -61,7 +61,7 @@ ROBOT = Topic(
     pace="frame",
 )
 ROBOT_STATE = Topic("robots/{id}/state", Robot, pace="read-out")
-"""Within frames alone: what of a robot is not its motion."""
+"""Sent within frames alone: the state of a robot without its motion."""
 SCAN = Topic("robots/{id}/scan", Scan, pace="picture")
 """Binary, so that ``web`` writes it (docs/interfaces/live.md)."""
 PEOPLE = Topic(
@@ -98,13 +98,13 @@ RULE = Topic(
     read=lambda reader, _: reader.rule(),
 )
 MAP = Topic("map", GreenhouseMap, member="map", read=lambda reader, _: reader.map())
-"""In the snapshot alone: it stays as it is while iVeg runs."""
+"""Sent in the snapshot alone: it does not change while iVeg runs."""
 LOG = Topic(
     "log",
     LogEntry,
-    tell=lambda reader, line, _: reader.log([line])[0],
+    tell=lambda _, line, __: LogEntry.from_record(line),
     member="log",
-    read=lambda reader, _: reader.newest_log(),
+    read=lambda reader, _: reader.log_since(),
 )
 HEALTH = Topic(
     "health",
@@ -148,19 +148,21 @@ TOPICS = (
 )
 
 
+# Each command has a topic of its own, so the cache must have a bound.
 @lru_cache(maxsize=4096)
 def find(topic: str) -> tuple[Topic, str]:
-    """The row of a topic and its key; empty where the topic has none.
+    """Row of a topic, and its key; empty where the topic has none.
 
     Raises:
         KeyError: no such topic.
     """
     for row in TOPICS:
-        head, hole, tail = row.name.partition("{id}")
-        if not hole and topic == row.name:
+        head, placeholder, tail = row.name.partition("{id}")
+        if not placeholder and topic == row.name:
             return row, ""
         key = topic.removeprefix(head).removesuffix(tail)
-        if hole and topic == row.of(key) and key and "/" not in key:
+        # ``robots/{id}`` must not take ``robots/{id}/scan`` with "A/scan" as its key.
+        if placeholder and topic == row.for_id(key) and key and "/" not in key:
             return row, key
     raise KeyError(topic)
 
@@ -172,5 +174,5 @@ def is_telemetry(topic: str) -> bool:
 
 
 def read_all(reader: StateReader, now: Instant) -> dict[str, Any]:
-    """The members of the snapshot that topics have, by name."""
+    """Members of the snapshot that topics fill, by name."""
     return {row.member: row.read(reader, now) for row in TOPICS if row.read}

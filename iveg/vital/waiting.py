@@ -4,7 +4,7 @@ import asyncio
 
 
 async def wait_set(event: asyncio.Event, timeout_s: float | None) -> None:
-    """Wait until an event is set, or for that long (s), and clear it."""
+    """Wait until an event is set, at most ``timeout_s`` (s), and clear it."""
     if not event.is_set():
         loop = asyncio.get_running_loop()
         timer = None if timeout_s is None else loop.call_later(timeout_s, event.set)

@@ -1,8 +1,8 @@
 """HTTP of the server: the newest connection comes in, the oldest idle one goes.
 
 So a STOP gets through while somebody holds a thousand half-sent requests open.  All
-other limits are a proxy's (docs/deployment.md, "TLS").  An open WebSocket is never
-displaced: it is not counted.
+other limits are a proxy's (docs/deployment.md, "TLS").  An open WebSocket does not
+count and is never closed for a newer connection.
 """
 
 import asyncio
@@ -14,21 +14,21 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 MOST: Final = 512
 HEAD_S: Final = 5.0
 MOST_HELD: Final = 65_536
-"""Bytes of a head, a trailer or the size of a chunk, which the parser holds."""
+"""Bytes of a head, a trailer or a chunk's size, which the parser keeps in memory."""
 
-# It says so for each; the answer says it, too.
+# One line for each bad request would fill the log; the answer says it anyway.
 logging.getLogger("uvicorn.error").addFilter(
     lambda record: record.getMessage() != "Invalid HTTP request received."
 )
 
 
 class BoundedHttp(HttpToolsProtocol):
-    """One connection of anybody's; ``bounded_http`` makes the class of a server.
+    """One connection; ``bounded_http`` makes the class of each server.
 
     Attributes:
-        table: All of the server, the one that was quiet longest first.
-        most: How many there may be.
-        head_s: Time in which a head has to be here (s).
+        table: Connections of the server, by the begin of their last request.
+        most: Number of connections that there may be.
+        head_s: Time in which a head has to be complete (s).
     """
 
     table: dict["BoundedHttp", None]
@@ -41,7 +41,7 @@ class BoundedHttp(HttpToolsProtocol):
     def connection_made(  # type: ignore[override]
         self, transport: asyncio.Transport
     ) -> None:
-        """Somebody has connected."""
+        """Count a new connection, and end another where there are too many."""
         super().connection_made(transport)
         self.table[self] = None
         self._await_head()
@@ -51,6 +51,7 @@ class BoundedHttp(HttpToolsProtocol):
                 for connection in self.table
                 if connection.is_idle and connection is not self
             )
+            # Without an idle connection the oldest goes, so that the newest comes in.
             next(idle, next(iter(self.table))).give_way()
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -59,7 +60,7 @@ class BoundedHttp(HttpToolsProtocol):
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Bytes have come."""
+        """Take bytes, and bound how many the parser holds."""
         self._held += len(data)
         super().data_received(data)
         if self._held > MOST_HELD:
@@ -68,47 +69,48 @@ class BoundedHttp(HttpToolsProtocol):
             self._await_head()
 
     def on_message_begin(self) -> None:
-        """A request begins."""
+        """Note that a request begins, which makes its connection the newest."""
         super().on_message_begin()
         self._lacks_head = True
+        # To the end of the table: it is now the newest.
         self._leave()
         self.table[self] = None
 
     def on_headers_complete(self) -> None:
-        """The head is here."""
+        """Note that the head is complete."""
         self._held = 0
         self._lacks_head = False
         self._end_timer()
         super().on_headers_complete()
 
     def on_body(self, body: bytes) -> None:
-        """A part of a body."""
+        """Take a part of a body, which the parser does not hold."""
         self._held = 0
         super().on_body(body)
 
     def on_message_complete(self) -> None:
-        """The request is whole."""
+        """Note that the request is complete."""
         self._held = 0
         super().on_message_complete()
 
     def handle_websocket_upgrade(self) -> None:
-        """It speaks WebSocket from now on."""
+        """Hand the connection over to WebSocket; it no longer counts."""
         self._leave()
         super().handle_websocket_upgrade()
 
     @property
     def is_idle(self) -> bool:
-        """Whether no whole request is being answered."""
+        """Whether no complete request is being answered."""
         cycle = self.cycle
         return cycle is None or cycle.response_complete or cycle.more_body
 
     def give_way(self) -> None:
-        """End it without waiting for anything."""
+        """Abort the connection at once."""
         self._leave()
         self.transport.abort()
 
     def _await_head(self) -> None:
-        """Bound the time of a head that has not come whole; more bytes prolong none."""
+        """Bound the time of an incomplete head; further bytes do not prolong it."""
         if self._timer is None:
             self._timer = self.loop.call_later(self.head_s, self.give_way)
 

@@ -1,4 +1,4 @@
-"""Cookies of the page: the session's, and what a browser has chosen."""
+"""Cookies of the page: the session, and the choices of a reader."""
 
 from typing import Final
 
@@ -8,5 +8,5 @@ PALETTE: Final = "iveg_palette"
 
 
 def session_cookie(*, secure: bool) -> str:
-    """Name of the session's; a browser takes the prefix over TLS alone."""
+    """Name of the session's cookie; browsers take the prefix only over TLS."""
     return "__Host-iveg" if secure else "iveg"

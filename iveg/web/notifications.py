@@ -5,69 +5,42 @@ its own limit and secret.  Refusals look like those of the rest of the applicati
 """
 
 import asyncio
-from collections.abc import Callable, Container, Mapping
-from dataclasses import dataclass
-from typing import Final, Protocol
+from collections.abc import Container, Mapping
+from typing import Final
 
 from starlette.responses import Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from iveg.adapters.reconciler import OwnSubscriptions
 from iveg.domain.errors import UnreadableError
-from iveg.domain.observations import EntityReading, Instant, Received
+from iveg.domain.observations import Received
 from iveg.domain.transports import FIWARE
 from iveg.ngsi.codec import read_notification
+from iveg.vital.core import Core
 from iveg.vital.ingest import Ingest
-from iveg.vital.ports import Clock
 from iveg.web.problems import Problem, problem_of
 from iveg.web.security.headers import MAX_BODY, NOTIFICATIONS_PATH, TOO_LONG
 from iveg.web.security.roles import Action
 from iveg.web.security.secrets import same_secret
 
 A_TURN: Final = 8
-"""Read in one turn of the loop, which reads one message of each MQTT connection: what
-comes straight from a robot must not wait behind copies."""
+"""Notifications in one turn of the loop, which reads one message of each MQTT
+connection: a robot's own message must not wait behind many copies."""
 _TAKEN = Response(status_code=204)
 _FORGED = Problem(401, "The notification secret is wrong.")
-
-
-class Subscriptions(Protocol):
-    """Subscriptions that iVeg made at Orion."""
-
-    def is_ours(self, subscription_id: str) -> bool:
-        """Whether a subscription is one that iVeg made."""
-
-    def is_former(self, secret: str) -> bool:
-        """Whether a secret may be that of our own earlier start."""
-
-
-@dataclass(frozen=True, slots=True)
-class Followers:
-    """Listeners to notifications; none of them may wait or fail.
-
-    Attributes:
-        notified: Each notification of Orion's came then.
-        equipment: Id and type of the entities that ``measured`` is told of.
-        measured: A reading of other equipment.
-        recorded: Each body that is read.
-    """
-
-    notified: Callable[[Instant], None]
-    equipment: Container[tuple[str, str]]
-    measured: Callable[[EntityReading, Instant], None]
-    recorded: Callable[[bytes, Instant], None]
 
 
 class NotificationEndpoint:
     """Takes Orion's notifications; an ASGI application.
 
     Args:
-        ingest: Where observations go and what cannot be used is counted.
-        secret: What a notification must carry.
-        clock: Read once a notification.
-        subscriptions: Those that iVeg made.
-        tenant: The Fiware service and path that count.
-        followers: What else is told.
+        core: Clock, health and listeners.
+        ingest: Takes observations, and counts what cannot be used.
+        secret: Secret that a notification must carry.
+        subscriptions: Subscriptions that iVeg made.
+        tenant: FIWARE service and path that are accepted.
+        equipment: Id and type of each entity of other equipment.
     """
 
     action: Final[Action] = "open"
@@ -75,16 +48,17 @@ class NotificationEndpoint:
 
     def __init__(
         self,
+        core: Core,
         ingest: Ingest,
         secret: str,
-        clock: Clock,
-        subscriptions: Subscriptions,
+        subscriptions: OwnSubscriptions,
         tenant: tuple[str, str],
-        followers: Followers,
+        equipment: Container[tuple[str, str]],
     ) -> None:
-        self._ingest, self._secret, self._clock = ingest, secret, clock
+        self._clock, self._health_monitor = core.ports.clock, core.health_monitor
+        self._tell = core.supervision.tell
+        self._ingest, self._secret, self._equipment = ingest, secret, equipment
         self._subscriptions, self._tenant = subscriptions, tenant
-        self._followers = followers
         self._turn = asyncio.Semaphore(A_TURN)
 
     def route(self) -> Route:
@@ -95,7 +69,7 @@ class NotificationEndpoint:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
-        # Of a header that is there twice the first counts, as everywhere in Starlette.
+        # Of a repeated header the first counts, as everywhere in Starlette.
         headers = dict(reversed(scope["headers"]))
         problem = self._refusal(scope, headers)
         if problem is None and not self._is_foreign(headers):
@@ -106,13 +80,14 @@ class NotificationEndpoint:
                 problem = Problem(413, TOO_LONG)
             else:
                 async with self._turn:
+                    # At most ``A_TURN`` of them pass this point in a turn of the loop.
                     await asyncio.sleep(0)
                     problem = self.receive(body)
         answer = _TAKEN if problem is None else problem.response()
         await answer(scope, receive, send)
 
     def _refusal(self, scope: Scope, headers: Mapping[bytes, bytes]) -> Problem | None:
-        """The reason not to read the body at all; None to read it."""
+        """The problem for which the body is not read; None to read it."""
         declared = headers.get(b"content-length", b"")
         if declared.isdigit() and int(declared) > MAX_BODY:
             # The unread body would be taken for the next request.
@@ -121,7 +96,7 @@ class NotificationEndpoint:
         if same_secret(given, self._secret):
             return None
         if given and self._subscriptions.is_former(given):
-            # Our own subscriptions until they are mended: no reason to suspect anybody.
+            # An earlier start of ours made that subscription; the provisioner mends it.
             self._ingest.counters["rejected.former_secret"] += 1
             return _FORGED
         client = scope.get("client")
@@ -129,53 +104,47 @@ class NotificationEndpoint:
         return _FORGED
 
     def _is_foreign(self, headers: Mapping[bytes, bytes]) -> bool:
-        """Whether it is of another tenant: taken, counted and ignored."""
+        """Whether another tenant sent it; it is answered, counted and ignored."""
         if _tenant_of(headers) == self._tenant:
             return False
         self._ingest.reject(_tenant_of(headers)[0] or "?", "foreign_tenant")
         return True
 
     def receive(self, body: bytes) -> Problem | None:
-        """Take a body that has just come; what is wrong with it, or None."""
-        at, followers = self._clock(), self._followers
+        """Take a body that has just come; returns the problem with it, or None."""
+        at = self._clock()
         try:
-            subscription_id, reading = read_notification(body, followers.equipment)
+            subscription_id, reading = read_notification(
+                body, self._equipment, self._ingest.is_known
+            )
         except UnreadableError as error:
             return problem_of(error)
         if not self._subscriptions.is_ours(subscription_id):
             self._ingest.reject(subscription_id, "unknown_subscription")
             return None
-        followers.notified(at)
-        followers.recorded(body, at)
+        self._health_monitor.notified_at = at.mono
+        self._tell("notified", body, at)
         for problem in reading.problems:
             self._ingest.reject(problem.source, problem.reason, problem.detail)
         for entity in reading.equipment:
-            followers.measured(entity, at)
+            self._tell("entity_read", entity, at)
         for observation in reading.observations:
             self._ingest.enqueue_copy(Received(observation, at, FIWARE.id))
         return None
 
 
-class NotificationsFirst:
-    """The outermost layer: hands notifications to their endpoint, and all else on.
+def notifications_first(app: ASGIApp, endpoint: NotificationEndpoint) -> ASGIApp:
+    """The application, whose outer layers notifications pass by.
 
-    Another method than POST goes on too, to be refused like everywhere.
+    Those layers would take a twentieth of the loop's time.
     """
+    first = "http", "POST", NOTIFICATIONS_PATH
 
-    def __init__(self, app: ASGIApp, endpoint: NotificationEndpoint) -> None:
-        self._app = app
-        self._endpoint = endpoint
+    async def serve(scope: Scope, receive: Receive, send: Send) -> None:
+        request = scope["type"], scope.get("method"), scope.get("path")
+        await (endpoint if request == first else app)(scope, receive, send)
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request."""
-        if (
-            scope["type"] == "http"
-            and scope["path"] == NOTIFICATIONS_PATH
-            and scope["method"] == "POST"
-        ):
-            await self._endpoint(scope, receive, send)
-        else:
-            await self._app(scope, receive, send)
+    return serve
 
 
 def _tenant_of(headers: Mapping[bytes, bytes]) -> tuple[str, str]:
@@ -184,7 +153,7 @@ def _tenant_of(headers: Mapping[bytes, bytes]) -> tuple[str, str]:
 
 
 async def _body(receive: Receive) -> bytes | None:
-    """The whole body; of one that is too long no more than shows it; None: cut off."""
+    """The body, read up to just beyond its limit; None where the sender went away."""
     body = b""
     while len(body) <= MAX_BODY:
         message = await receive()

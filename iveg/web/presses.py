@@ -46,6 +46,7 @@ async def press_of(request: Request) -> Press:
     """The press in a request's body; none in a late or unreadable body."""
     try:
         async with asyncio.timeout(_BODY_WITHIN_S):
+            # A slow line must not hold a STOP up: it goes without the page's account.
             body = await request.body()
         return read_press(load_json(body) if 0 < len(body) <= _LARGEST_BODY else None)
     except (TimeoutError, ClientDisconnect, UnreadableError):
@@ -53,7 +54,7 @@ async def press_of(request: Request) -> Press:
 
 
 def read_press(value: object) -> Press:
-    """The press in a message; an impossible value is left out."""
+    """The press in a message; unusable values are left out."""
     if not isinstance(value, dict):
         return Press()
     press_id = value.get("press_id")
@@ -63,11 +64,12 @@ def read_press(value: object) -> Press:
 
 def read_number(value: object) -> float | None:
     """A finite number that a page sent; None for anything else."""
-    # True is a number to Python, and not to anybody else.
+    # Python counts True as a number; JSON does not.
     if not isinstance(value, int | float) or isinstance(value, bool):
         return None
     try:
         number = float(value)
     except OverflowError:
+        # JSON's whole numbers have no bound, a float has one.
         return None
     return number if math.isfinite(number) else None

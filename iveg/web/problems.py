@@ -1,7 +1,7 @@
-"""Errors become HTTP here, the only file that knows both (RFC 9457).
+"""Errors become HTTP here, in the only file that knows both (RFC 9457).
 
 The answer is ``application/problem+json``, or a page where a person's browser asked for
-one.  It echoes no input and reveals nothing internal.  HTTP adds to the tree of
+a page.  It echoes no input and reveals nothing internal.  HTTP adds to the tree of
 ``domain/errors``::
 
     IvegError
@@ -71,7 +71,7 @@ class Problem:
     Attributes:
         code: Stable, for programs; the last part of ``type``.
         extra: Further members, such as ``why`` of a refused release.
-        headers: What the status asks for, such as ``Allow`` with 405.
+        headers: Headers of the status, such as ``Allow`` with 405.
     """
 
     status: int
@@ -90,7 +90,7 @@ class Problem:
             **self.extra,
         }
         return JSONResponse(
-            # A name that somebody asked for may be told back, but turns nothing round.
+            # A name of the request is repeated without marks that turn text round.
             all_legible(members),
             self.status,
             headers={"Cache-Control": "no-store", **self.headers},
@@ -123,7 +123,7 @@ def install(app: FastAPI, page: Page | None = None) -> None:
 
 
 def problem_of(error: Exception) -> Problem:
-    """The problem that an error is to the outside."""
+    """The problem that callers see for an error."""
     match error:
         case RequestValidationError():
             return _invalid(error)
@@ -137,7 +137,7 @@ def problem_of(error: Exception) -> Problem:
             ends = {"before": stamp(error.before), "after": stamp(error.after)}
             return Problem(404, str(error), "not-recorded", ends)
         case HopError():
-            # Addresses and drivers' words stay inside.
+            # Addresses and messages of drivers stay inside.
             detail = f"{error.hop} did not answer."
             return Problem(503, detail, "hop", {"hop": error.hop})
     for kind, status, code in _PLAIN:
@@ -178,7 +178,7 @@ def _invalid(error: RequestValidationError) -> Problem:
     complaints = error.errors()
     if any(complaint["type"] == "json_invalid" for complaint in complaints):
         return Problem(400, "The body is not JSON.", "unreadable")
-    # Only where and what: the input itself may hold NaN, secrets or megabytes.
+    # Only place and reason: the input itself may hold NaN, secrets or megabytes.
     errors = [
         {
             "where": ".".join(str(part) for part in complaint["loc"])[:200],
@@ -194,5 +194,6 @@ def _invalid(error: RequestValidationError) -> Problem:
 
 
 def _wants_a_page(request: Request) -> bool:
+    # The API answers JSON to a browser, too.
     accepts_html = "text/html" in request.headers.get("accept", "")
     return accepts_html and not request.url.path.startswith("/api/")

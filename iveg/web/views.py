@@ -6,15 +6,13 @@ from itertools import islice, takewhile
 
 from iveg.comfort.situations import Situations, fresh_report
 from iveg.domain import margins as margins_
-from iveg.domain.geometry import Pose2D
 from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import Instant
-from iveg.domain.records import LogRecord
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.zones import ZoneEntry
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import FollowedCommand, StopMachine
-from iveg.domain.tracking.person import TrackedPerson
+from iveg.domain.tracking.tracker import TrackedPerson
 from iveg.models.base import GreenhouseMap, Pose, Position, Scan, Twist, stamp
 from iveg.models.command import Command as CommandModel
 from iveg.models.health import Health
@@ -40,7 +38,6 @@ from iveg.models.robot import (
 from iveg.models.rule import Rule
 from iveg.models.snapshot import Climate, Tile
 from iveg.pipeline import Pipeline
-from iveg.vital.health_monitor import HopHealth
 
 _FIRST_LINES = 200
 
@@ -49,8 +46,8 @@ class Views:
     """Reads the pipeline's state for browsers and integrators.
 
     Args:
-        parts: Whose state.
-        counters: Everything that is counted; unless told, what the pipeline counts.
+        parts: The pipeline with the state.
+        counters: All counters; by default those of the pipeline.
     """
 
     def __init__(
@@ -79,7 +76,7 @@ class Views:
         return [self.robot(robot_id, now) for robot_id in self._world.robots]
 
     def margins(self, now: Instant) -> LeastMargins:
-        """Margins of all live robots and people, for callers that need many."""
+        """Margins of all live robots and people, computed together for many robots."""
         return LeastMargins(self._world.live_robots(), self._people.known.values(), now)
 
     def robot(
@@ -90,53 +87,54 @@ class Views:
         machine = self._commander.machine(robot_id)
         odometry, safety, age = robot.odometry, robot.safety, robot.age_s(now)
         goal = self._goals.newest(robot_id, now)
+        pose = None if odometry is None else odometry.pose
         return Robot(
             robot_id=robot_id,
             link=robot.link(now),
-            situation=Situation.from_value(self._situations.of(robot, machine, now)),
+            situation=Situation.from_value(
+                self._situations.situation(robot, machine, now)
+            ),
             mode=self._mode(robot, machine, now),
-            pose=None if odometry is None else Pose.from_value(odometry.pose),
-            lane=None if odometry is None else self._lane(odometry.pose),
-            twist=None if odometry is None else Twist.of(odometry.twist),
+            pose=None if pose is None else Pose.from_value(pose),
+            lane=None if pose is None else self._greenhouse.lane_at(pose.x, pose.y),
+            twist=None if odometry is None else Twist.from_twist(odometry.twist),
             stamp=None if odometry is None else odometry.origin.stamp,
             received_at=stamp(robot.odometry_received),
             age_s=age,
             age_estimated=robot.estimated_since is not None,
             speed_factor=None if safety is None else safety.speed_factor,
-            applied=Applied.of(robot, now),
+            applied=Applied.from_robot(robot, now),
             speed_limit=SpeedLimit.from_value(self._evaluator.speed_limits[robot_id]),
             encounters=[
-                Encounter.of(one, now)
-                for one in self._evaluator.encounters(robot_id, now)
+                Encounter.from_encounter(encounter, now)
+                for encounter in self._evaluator.encounters(robot_id, now)
             ],
             missing=[
-                MissingPremise(premise=one.reason, robot_id=one.robot_id)
-                for one in self._evaluator.unmet(robot_id)
+                MissingPremise(premise=unmet.reason, robot_id=unmet.robot_id)
+                for unmet in self._evaluator.unmet(robot_id)
             ],
-            detector=Detector.of(robot, now),
+            detector=Detector.from_robot(robot, now),
             refused=robot.refused,
             holds=[]
             if safety is None
-            else [Hold.from_value(one) for one in safety.holds],
+            else [Hold.from_value(hold) for hold in safety.holds],
             stop=None if machine.stop is None else self.command(machine.stop, now),
             stop_state=machine.state,
-            navigation=Navigation.of(robot),
-            goal=None if goal is None else Goal.of(goal),
+            navigation=Navigation.from_robot(robot),
+            goal=None if goal is None else Goal.from_goal(goal),
             replay=robot.is_replay,
             clock_offset_s=robot.clock.offset_s(now),
             transport=robot.odometry_transport,
             profile=Profile.from_value(robot.profile),
-            margin=Margin.of(self._margin(robot, margins, now)),
+            margin=Margin.from_margin(self._margin(robot, margins, now)),
             cmd_status=robot.command_status,
             **Robot.sensed(robot, now),
         )
 
-    def _lane(self, place: Pose2D) -> str | None:
-        return self._greenhouse.lane_at(place.x, place.y)
-
     def _margin(
         self, robot: RobotState, margins: LeastMargins | None, now: Instant
     ) -> margins_.SafetyMargin | None:
+        # The fleet's margins are of live robots alone; a replay has its own.
         if margins is None or robot.is_replay:
             margins = LeastMargins([robot], self._people.known.values(), now)
         return margins.of_robot(robot.robot_id)
@@ -179,8 +177,8 @@ class Views:
     def people(self, now: Instant) -> list[PersonModel]:
         """Every known person."""
         entries = defaultdict[str, list[ZoneEntry]](list)
-        for one in self._evaluator.entries:
-            entries[one.zone.cause].append(one)
+        for entry in self._evaluator.entries:
+            entries[entry.zone.cause].append(entry)
         return [
             self._person(person, entries[person.person_id], now)
             for person in self._people.known.values()
@@ -209,11 +207,12 @@ class Views:
             age_s=person.age_s(now),
             observers=person.observers(now),
             possible=newest.possible or newest.laser,
-            evidence=Evidence.of(newest.looks),
+            evidence=Evidence.from_looks(newest.looks),
+            # With a reach the place is the observer's: its box lay beyond the walls.
             doubtful=newest.reach_m > 0.0,
-            decision_id=max((one.decision_id for one in entries), default=None),
+            decision_id=max((entry.decision_id for entry in entries), default=None),
             lane=self._greenhouse.lane_at(x, y),
-            acting=[Acting.from_value(one) for one in entries],
+            acting=[Acting.from_value(entry) for entry in entries],
             thing_id=None if thing is None else thing.thing_id,
         )
 
@@ -229,8 +228,8 @@ class Views:
             transport=transport,
             age_s=now.mono - robot.detections_at,
             items=[
-                Detection.of(one, robot_id, stamp, transport)
-                for one in self._evaluator.tracking.placed.get(robot_id, [])
+                Detection.from_placed(placed, robot_id, stamp, transport)
+                for placed in self._evaluator.tracking.placed.get(robot_id, [])
             ],
         )
 
@@ -243,7 +242,9 @@ class Views:
 
     def command(self, command: FollowedCommand, now: Instant) -> CommandModel:
         """One command with the robot's newest report."""
-        return CommandModel.of(command, self._commander.machine(command.robot_id), now)
+        return CommandModel.from_command(
+            command, self._commander.machine(command.robot_id), now
+        )
 
     def find_command(self, command_id: str, now: Instant) -> CommandModel | None:
         """A command of this run; older ones are in the history."""
@@ -261,25 +262,23 @@ class Views:
     def alerts(self) -> list[Alert]:
         """All alerts that people should see now, gravest first."""
         waiting = self._evaluator.alerts.waiting
-        waiting.sort(key=lambda one: (one.priority, -one.last.raised.wall))
-        return [Alert.of(one) for one in waiting]
+        waiting.sort(key=lambda alert: (alert.priority, -alert.last.raised.wall))
+        return [Alert.from_alert(alert) for alert in waiting]
 
-    def log(self, lines: Iterable[LogRecord]) -> list[LogEntry]:
-        """Lines of the log."""
-        return [LogEntry.from_record(line) for line in lines]
-
-    def log_since(self, line_id: int) -> list[LogEntry]:
-        """The lines after one, oldest first; of many the newest."""
+    def log_since(self, line_id: int = -1) -> list[LogEntry]:
+        """Lines with a higher id, oldest first; the newest where there are many."""
         newest = islice(reversed(self._event_log.lines), _FIRST_LINES)
-        return self.log(takewhile(lambda one: one.id > line_id, newest))[::-1]
-
-    def newest_log(self) -> list[LogEntry]:
-        """The lines that a page begins with, oldest first."""
-        return self.log(list(self._event_log.lines)[-_FIRST_LINES:])
+        later = takewhile(lambda line: line.id > line_id, newest)
+        return [LogEntry.from_record(line) for line in later][::-1]
 
     def health(self, now: Instant) -> Health:
         """Every hop with its state and age, all counters."""
-        hops = [_hop(one) for one in self._health_monitor.hops(now)]
+        hops = [
+            HopModel.from_value(
+                hop, hop=hop.name.value, key=f"health.{hop.name.label}.{hop.state}"
+            )
+            for hop in self._health_monitor.hops(now)
+        ]
         return Health(
             ok=all(hop.state == "ok" for hop in hops),
             hops=hops,
@@ -292,25 +291,20 @@ class Views:
         climate, received = self._world.climate, self._world.climate_received
         if climate is None or received is None:
             return None
-        return Climate.of(climate, received, now)
+        return Climate.from_climate(climate, received, now)
 
     def equipment(self, now: Instant) -> list[Tile]:
         """Every tile of other equipment, in the order of its file."""
         known = self._equipment
         return [
-            Tile.of(one, known.status(one), known.state(one, now), now)
-            for one in known.tiles
+            Tile.from_tile(tile, known.status(tile), known.state(tile, now), now)
+            for tile in known.tiles
         ]
 
     def map(self) -> GreenhouseMap:
         """The greenhouse as the page draws it."""
-        return GreenhouseMap.of(self._greenhouse)
+        return GreenhouseMap.from_greenhouse(self._greenhouse)
 
     def rule(self) -> Rule:
         """The version of the rule that is in force."""
-        return Rule.of(self._evaluator.rule)
-
-
-def _hop(hop: HopHealth) -> HopModel:
-    key = f"health.{hop.name.label}.{hop.state}"
-    return HopModel.from_value(hop, hop=hop.name.value, key=key)
+        return Rule.from_rule(self._evaluator.rule)

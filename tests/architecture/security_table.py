@@ -8,15 +8,15 @@ from pathlib import Path
 from fastapi import FastAPI
 from fastapi.routing import iter_route_contexts
 
-from iveg.app.dss import open_dss
+from iveg.app import App
 from iveg.asgi import create_app
-from iveg.domain.tracking import person
+from iveg.domain.tracking import things
 from iveg.settings import Settings
 from iveg.web.api import alerts
 from iveg.web.security.audited import AUDITED, READING, Audited
-from iveg.web.security.requirements import declared_action
 from iveg.web.security.roles import MAY
 from tests.processes import ROOT
+from tests.routes import declared_action
 
 PAGE = ROOT / "SECURITY.md"
 _BEGIN, _END = "<!-- routes -->\n", "<!-- end of routes -->\n"
@@ -33,7 +33,7 @@ _LIMITS = {
     f"POST {_API}/rule/trial/promote": "upon the version that was seen",
     f"POST {_API}/notes": f"{alerts.MOST_TEXT} characters",
     f"POST {_API}/alerts/acknowledge": f"{alerts.MOST_TOGETHER} alerts",
-    f"POST {_API}/things": f"{person.MOST_THINGS}",
+    f"POST {_API}/things": f"{things.MOST_THINGS}",
     f"PUT {_API}/account/password": _WRONG,
 }
 """What bounds a route beside its role; of all others the size of the body alone."""
@@ -79,5 +79,5 @@ def with_table(text: str, rows: str) -> str:
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as data:
-        made = table(create_app(open_dss(Settings(), Path(data))))
+        made = table(create_app(App(Settings(), Path(data))))
     PAGE.write_text(with_table(PAGE.read_text(), made))

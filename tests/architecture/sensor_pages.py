@@ -20,10 +20,10 @@ _ROS_ROWS = re.compile(r"(\n\| \(none\) [^\n]*\| mask \|\n)((?:\|[^\n]* s \|\n)*
 
 
 def _rows(kind: Kind) -> str:
-    types = get_type_hints(kind.of)
+    types = get_type_hints(kind.type_)
     return "".join(
         f"| `{name}` | {_TYPES[types[name]]} | {one.unit} | {one.meaning} |\n"
-        for name, one in quantities_of(kind.of).items()
+        for name, one in quantities_of(kind.type_).items()
     )
 
 

@@ -52,7 +52,7 @@ from iveg.models.docs import write_page
 from iveg.models.history import Decision, Measurement
 from iveg.models.typescript import write_types
 from iveg.vital.record import Waiting
-from iveg.web.api.exports import csv_head, csv_rows, ndjson_rows
+from iveg.web.api.exports import csv_lines, ndjson_rows
 
 decision = DecisionRecord(
     decision_id="D", kind="alert", robot_id="AGI", started_at=1.0, slope=0.25
@@ -81,8 +81,9 @@ for of, model, key in (
     (lists.MEASUREMENTS, Measurement, "checked_at"),
 ):
     kept = asyncio.run(ask(of))
-    head = csv_head(of.kind).decode().strip().split(",")
-    row = csv_rows(of.kind, [kept]).decode().strip()
+    written = csv_lines(of.kind, [kept], has_head=True).decode()
+    first, row = written.splitlines()
+    head = first.split(",")
     line = json.loads(ndjson_rows(model.from_record, [(kept,)]))
     told[key] = [
         getattr(kept, key),

@@ -105,11 +105,11 @@ SLIPS = """
 from dataclasses import replace
 from iveg.domain.observations import Odometry, Instant
 from iveg.ngsi import codec
-from iveg.robot.uplink import Origins, Uplink
+from iveg.robot.uplink import Sender, Uplink
 from tests.builders import odometry
 
 sent = {}
-uplink = Uplink("AGI", "iveg", Origins("boot"), sent.__setitem__)
+uplink = Uplink(Sender("AGI", "iveg", "boot"), sent.__setitem__)
 uplink.send(replace(odometry(), slip=0.25), Instant(1.0, 1.7e9))
 (read,) = codec.read_measure("AGI_odom", sent["/iveg/AGI_odom/attrs"]).observations
 assert isinstance(read, Odometry) and read.slip == 0.25, read
@@ -121,18 +121,18 @@ GUARDS = ("tests/architecture/test_sensors.py", "tests/unit/test_page_types.py")
 WRITERS = "iveg.models.typescript", "tests.architecture.sensor_pages"
 WHOLE = """
 from dataclasses import replace
-from iveg.adapters.reconciler import WANTED_OF_ALL
+from iveg.adapters.reconciler import COMMON_SUBSCRIPTIONS
 from iveg.domain.observations import Instant, Received, SoilMoisture
 from iveg.domain.records import ReadingRecord
 from iveg.domain.world import World
 from iveg.models.robot import Robot
 from iveg.ngsi import codec, names
-from iveg.robot.uplink import Origins, Uplink
+from iveg.robot.uplink import Sender, Uplink
 from tests.unit.vital.desk import Desk, conditions_of
 import asyncio
 
 sent = {}
-uplink = Uplink("AGI", "iveg", Origins("boot"), sent.__setitem__)
+uplink = Uplink(Sender("AGI", "iveg", "boot"), sent.__setitem__)
 uplink.send(SoilMoisture("", codec.read_measure, 12.5), Instant(1.0, 1.7e9))
 ((topic, payload),) = sent.items()
 assert topic == "/iveg/AGI_soil_moisture/attrs", topic
@@ -140,7 +140,7 @@ assert topic == "/iveg/AGI_soil_moisture/attrs", topic
 assert isinstance(read, SoilMoisture) and read.percentage == 12.5, read
 wet = codec.read_attributes("AGI", {"soil_moisture": {"percentage": 101}})
 assert [one.reason for one in wet.problems] == ["bad_soil_moisture"]
-assert "soil_moisture" in {one.name for one in WANTED_OF_ALL}
+assert "soil_moisture" in {want.name for want in COMMON_SUBSCRIPTIONS}
 assert "AGI_soil_moisture" in {"AGI" + one.suffix for one in names.ROBOT_DEVICES}
 
 async def main():

@@ -1,6 +1,5 @@
 """Every door of the finished application is declared, and every document knows it."""
 
-import hashlib
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,14 +10,15 @@ from fastapi import FastAPI
 from fastapi.routing import iter_route_contexts
 from starlette.requests import Request
 
-from iveg.app.dss import open_dss
+from iveg.app import App
 from iveg.asgi import create_app
+from iveg.domain.accounts import digest_of
 from iveg.settings import Settings
 from iveg.web.security.audited import AUDITED, READING
-from iveg.web.security.requirements import declared_action
 from iveg.web.security.roles import MAY, Action
 from iveg.web.security.sessions import LASTS_S
 from tests.architecture import documents, security_table
+from tests.routes import declared_action
 
 INTERFACES = documents.interfaces()
 HEADINGS = documents.named_headings(INTERFACES)
@@ -37,7 +37,7 @@ scripts below `/static`, and must be at the root."""
 @pytest.fixture(scope="module")
 def app(tmp_path_factory: pytest.TempPathFactory) -> FastAPI:
     settings = Settings(api_token=API_TOKEN)
-    return create_app(open_dss(settings, tmp_path_factory.mktemp("data")))
+    return create_app(App(settings, tmp_path_factory.mktemp("data")))
 
 
 def test_every_route_and_websocket_declares_a_role(app: FastAPI) -> None:
@@ -129,9 +129,10 @@ def _who(app: FastAPI, role: str) -> dict[str, str]:
     if role != "expired":
         return {**own, "Cookie": f"iveg={sessions.open('ana', role)}"}
     token = sessions.open("ana", "admin")
-    digest = hashlib.sha256(token.encode()).digest()
-    old = sessions._sessions[digest]
-    sessions._sessions[digest] = replace(old, began=old.began - LASTS_S * 1.5)
+    digest = digest_of(token)
+    known = app.state.authenticator.people.book.sessions
+    old = known[digest]
+    known[digest] = replace(old, began=old.began - LASTS_S * 1.5)
     return {**own, "Cookie": f"iveg={token}"}
 
 

@@ -10,7 +10,7 @@ import pytest
 from fastapi import FastAPI
 
 from iveg.adapters.history.engine import history_url, upgrade
-from iveg.app.dss import open_dss
+from iveg.app import App
 from iveg.asgi import create_app
 from iveg.settings import Settings
 
@@ -23,7 +23,7 @@ ODD = {"since": MOMENTS, "until": MOMENTS, "day": DAYS}
 @pytest.fixture
 def app(tmp_path: Path) -> FastAPI:
     upgrade(history_url(None, tmp_path))
-    return create_app(open_dss(Settings(), tmp_path))
+    return create_app(App(Settings(), tmp_path))
 
 
 @pytest.fixture

@@ -1,15 +1,17 @@
 """A parameter of the rule is one row: added in a copy, it is wherever it has to be."""
 
 import json
+import math
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import field, fields, make_dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import pytest
 
-from iveg.domain.parameters import PARAMETERS
+from iveg.domain.parameters import PARAMETERS, Parameters, parameters_of
 from tests.processes import ROOT
 
 TABLE = "iveg/domain/parameters.py"
@@ -30,10 +32,9 @@ ROW = """
     )
 
 
-PARAMETERS: Final"""
+_ROWS ="""
 ASKS = """
 import json
-from dataclasses import replace
 from iveg.adapters.rules import StoredRule, rule_fields
 from iveg.domain.detection_rule import DetectionRule, strictest
 from iveg.domain.feedback import Feedback
@@ -49,7 +50,7 @@ from iveg.web.pages.sentences import read_sentences
 from iveg.web.security.audited import AUDITED
 
 settings = Settings.from_environment({"IVEG_PAUSE_S": "2,person=3"})
-rule = DetectionRule.of(settings.rule)
+rule = DetectionRule.from_parameters(settings.rule)
 change = RuleChange(class_pauses_s={"person": 4.0})
 line = json.dumps(rule_fields(rule))
 site = Site("none", ("AGI",), "1", demo=False)
@@ -60,11 +61,11 @@ told = Feedback("AGI", Origin("b", 1), rule=sent_to_robots(rule))
 print(json.dumps({
     "settings": settings.to_environment()["IVEG_PAUSE_S"],
     "page of settings": "IVEG_PAUSE_S" in describe(),
-    "rest": Rule.of(rule).model_dump()["class_pauses_s"],
-    "body": change.applied_to(rule).pause_s.of("person"),
+    "rest": Rule.from_rule(rule).model_dump()["class_pauses_s"],
+    "body": change.applied_to(rule).pause_s.for_class("person"),
     "stored": StoredRule.model_validate_json(line).rule() == rule,
     "strictest": strictest([rule, DetectionRule()], 0.0).pause_s.every,
-    "audit": "class_pauses_s" in AUDITED["PUT", "/api/v1/rule"].asked,
+    "audit": "class_pauses_s" in AUDITED["PUT", "/api/v1/rule"].sent,
     "evidence": for_class(rule, "person")["pause_s"],
     "feedback": codec.read_feedback(codec.write_feedback(told)).rule["pause_s"],
     "form": [one in html for one in ("rule-new-pause", "rule-new-pause-robot")],
@@ -80,7 +81,7 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ROOT / "iveg", copy / "iveg", ignore=shutil.ignore_patterns("__pycache__")
     )
     table = copy / TABLE
-    table.write_text(table.read_text().replace("\n\nPARAMETERS: Final", ROW, 1))
+    table.write_text(table.read_text().replace("\n\n_ROWS =", ROW, 1))
     for path in TEXTS:
         texts = json.loads((copy / path).read_text())
         texts["rule"]["part"]["pause"] = texts["lowering"]["pause"] = "Pause"
@@ -119,10 +120,25 @@ def test_nothing_but_the_table_names_the_radius_by_class(copied: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"least": 3.0}, {"class_key": None}], ids=["bounds", "keys"]
-)
+    "wrong",
+    [
+        {"least": 9.0}, {"most": math.inf}, {"class_key": "classes"}, {"key": ""},
+        {"unit": "switch"}, {"unit": "seconds"}, {"protects": "greater"},
+        {"variable": "S"}, {"variable": "IVEG_FORESIGHT"}, {"key": "radius_m"},
+    ],
+)  # fmt: skip
 def test_a_wrong_row_is_refused_by_name(wrong: dict[str, object]) -> None:
-    (row,) = (one for one in PARAMETERS if one.name == "radius_m")
+    metadata = {row.name: row.metadata for row in fields(Parameters)}
+    metadata["foresight_s"] = MappingProxyType({**metadata["foresight_s"], **wrong})
+    rows = [(name, object, field(metadata=row)) for name, row in metadata.items()]
 
-    with pytest.raises(ValueError, match="radius_m"):
-        replace(row, **wrong)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"(?i)foresight|radius_m"):
+        parameters_of(make_dataclass("Table", rows))
+
+
+@pytest.mark.parametrize("path", TEXTS)
+def test_each_parameter_has_its_texts(path: str) -> None:
+    texts = json.loads((ROOT / path).read_text())
+
+    words = {row.word for row in PARAMETERS}
+    assert words <= texts["rule"]["part"].keys() & texts["lowering"].keys()

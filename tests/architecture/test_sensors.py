@@ -12,13 +12,13 @@ from iveg.lab.emulator.world import EMULATED
 from iveg.robot.ros2.topics import ROS_SENSORS
 from tests.processes import ROOT
 
-_RECEIVED_AS_ANOTHER = {"RefusedFrame", "Unplaced"}
+_RECEIVED_AS_ANOTHER = {"Copy", "RefusedFrame", "Unplaced"}
 
 
 def words_of(kind: Kind) -> set[str]:
     """Keys of the sentences that pages and alerts have of a small sensor."""
     low = [f"alert.{kind.name}_low"] if kind.sensor and kind.sensor.low else []
-    endings = ("", "_level", *(f"_{flag}" for flag in flags_of(kind.of)))
+    endings = ("", "_level", *(f"_{flag}" for flag in flags_of(kind.type_)))
     return {
         *(f"robot.{kind.name}{ending}" for ending in endings),
         *low,
@@ -38,7 +38,7 @@ def test_every_observation_has_one_row() -> None:
         if isinstance(one, type) and issubclass(one, Observation)
     } - {"Observation", *_RECEIVED_AS_ANOTHER}
 
-    told = sorted(row.of.__name__ for row in KINDS)
+    told = sorted(row.type_.__name__ for row in KINDS)
     assert told == sorted(kinds), "iveg/domain/kinds.py"
 
 
@@ -52,7 +52,7 @@ def test_every_sensor_has_its_words(language: str, kind: Kind) -> None:
 
 
 def test_every_sensor_is_emulated() -> None:
-    assert set(EMULATED) == {one.of for one in SENSED}, "iveg/lab/emulator/world.py"
+    assert set(EMULATED) == {row.type_ for row in SENSED}, "iveg/lab/emulator/world.py"
 
 
 def test_every_sensor_has_its_topic_on_a_ros_2_robot() -> None:

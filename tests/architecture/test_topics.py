@@ -29,8 +29,8 @@ def test_the_snapshot_has_the_member_of_every_row() -> None:
 def test_a_topic_is_found_by_what_it_writes(row: Topic) -> None:
     key = "AGI" if "{id}" in row.name else ""
 
-    assert find(row.of(key)) == (row, key)
-    assert is_telemetry(row.of(key)) == (row.pace != "at once")
+    assert find(row.for_id(key)) == (row, key)
+    assert is_telemetry(row.for_id(key)) == (row.pace != "at once")
 
 
 @pytest.mark.parametrize(

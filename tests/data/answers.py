@@ -140,6 +140,7 @@ def _open(desk: WebDesk, queries: Queries) -> None:
         history.router(
             queries,
             FakeWorker(),
+            present=desk.evaluator.decision_record,
             read_clock=lambda: seen_at,
         )
     )

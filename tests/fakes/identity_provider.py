@@ -1,8 +1,7 @@
-"""An identity provider on loopback, in the shapes of three, and with their vices.
+"""An identity provider on loopback, and its vices.
 
 It speaks HTTP, keeps PKCE and its codes, signs by RSA or EC, and shows a page on which
-a browser signs in.  What it tells of people has the shape of Keycloak's, Entra's or
-Keyrock's documentation (docs/deployment.md, "Single sign-on").
+a browser signs in.
 """
 
 import asyncio
@@ -42,20 +41,6 @@ KEYCLOAK = {
     "name": "Ana Núñez",
     "realm_access": {"roles": ["offline_access", "growers"]},
 }
-ENTRA = {
-    "oid": "00000000-0000-0000-66f3-3332eca7ea81",
-    "name": "Ana Núñez",
-    "groups": ["0760b6cf-170e-4a14-91b3-4b78e0739963"],
-    "roles": ["growers"],
-}
-KEYROCK = {
-    "organizations": [{"id": "13e8", "name": "coop", "roles": [{"name": "owners"}]}],
-    "displayName": "Ana Núñez",
-    "roles": [{"id": "9c4e", "name": "growers"}],
-    "email": "ana@coop.test",
-    "username": "ana",
-}
-"""Of one person, by each of the three."""
 
 _PAGE = """<!doctype html><title>Provider</title><form method="post" action="/login">
 <input type="hidden" name="asked" value="{}"><label>Name <input name="who"></label>
@@ -80,6 +65,7 @@ class FakeIdentityProvider:
         people: Subject → claims.
         vice: What it does wrong; empty: nothing.
         id_token: Changes the claims of the next ID token.
+        also: Changes its description.
         asked: Paths that were asked for, and forms that came to the token endpoint.
     """
 
@@ -89,6 +75,7 @@ class FakeIdentityProvider:
     alg: str = "RS256"
     vice: str = ""
     id_token: dict[str, Any] = field(default_factory=dict)
+    also: dict[str, Any] = field(default_factory=dict)
     in_user_info: bool = False
     asked: list[str] = field(default_factory=list)
     forms: list[dict[str, str]] = field(default_factory=list)
@@ -120,10 +107,8 @@ class FakeIdentityProvider:
                 Route("/.well-known/openid-configuration", self._about),
                 Route("/keys", self._keys),
                 Route("/authorize", self._authorize),
-                Route("/oauth2/authorize", self._authorize),
                 Route("/login", self._login, methods=["POST"]),
                 Route("/token", self._token, methods=["POST"]),
-                Route("/oauth2/token", self._token, methods=["POST"]),
                 Route("/userinfo", self._user_info),
             ]
         )
@@ -158,7 +143,9 @@ class FakeIdentityProvider:
             about["issuer"] = "https://somebody-else.test"
         if self.vice == "plain_http":
             about["token_endpoint"] = "http://169.254.169.254/latest"
-        return JSONResponse(about)
+        if self.vice == "endless_address":
+            about["token_endpoint"] = f"https://somebody-else.test/{'a' * 70_000}"
+        return JSONResponse(about | self.also)
 
     async def _keys(self, request: Request) -> Response:
         if (bad := await self._vice(request)) is not None:
@@ -186,19 +173,18 @@ class FakeIdentityProvider:
         login = base64.b64encode(f"{CLIENT}:{SECRET}".encode()).decode()
         who, asked = self._codes.pop(form["code"], ("", {}))
         challenge = hashlib.sha256(form["code_verifier"].encode()).digest()
-        proof = _encoded(challenge).decode()
         is_theirs = (
             request.headers.get("authorization") == f"Basic {login}"
             and form["redirect_uri"] == asked.get("redirect_uri")
-            and asked.get("code_challenge", proof) == proof
+            and asked["code_challenge"] == _encoded(challenge).decode()
         )
-        if not who or not is_theirs:
+        if not is_theirs:
             return JSONResponse({"error": "invalid_grant"}, 400)
         access = secrets.token_urlsafe(16)
         self._tokens[access] = who
         told = {"access_token": access, "token_type": "bearer", "expires_in": 300}
-        if "nonce" in asked:
-            told["id_token"] = self._signed(who, asked["nonce"])
+        name = "userinfo" if self.vice == "unsigned" else "id_token"
+        told[name] = self._signed(who, asked["nonce"])
         return JSONResponse(told)
 
     def _signed(self, who: str, nonce: str) -> str:
@@ -230,8 +216,7 @@ class FakeIdentityProvider:
                 mac = hmac.digest(public, b".".join(parts), "sha256")
                 return b".".join([*parts, _encoded(mac)]).decode()
             case "foreign_key":
-                stolen = _new_key()
-                return jwt.encode(header, claims, stolen)
+                return jwt.encode(header, claims, _new_key())
             case "no_token":
                 return "not.a.token"
         return jwt.encode(header, claims, self.key, [self.alg])

@@ -4,9 +4,8 @@ from collections.abc import Mapping
 from typing import Generic, TypeVar
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.detector import OutOfService
+from iveg.domain.detector import OutOfService, WordAnswer
 from iveg.domain.errors import HopError
-from iveg.domain.words import WordAnswer
 from iveg.vital.operators import Kept, KeptChoices
 
 _T = TypeVar("_T")

@@ -2,16 +2,15 @@
 
 import asyncio
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar
+from typing import Any, TypeVar
 
-_P = ParamSpec("_P")
+from iveg.adapters.worker import Worker
+
 _T = TypeVar("_T")
 
 
-class FakeWorker:
-    """As ``adapters.worker.Worker``, without a process."""
+class FakeWorker(Worker):
+    """A worker that starts no process."""
 
-    async def run(
-        self, work: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs
-    ) -> _T:
+    async def run(self, work: Callable[..., _T], *args: Any, **kwargs: Any) -> _T:
         return await asyncio.to_thread(work, *args, **kwargs)

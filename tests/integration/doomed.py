@@ -5,17 +5,18 @@ import os
 import sys
 from pathlib import Path
 
-from iveg.app.dss import Dss, Work
+from iveg.app import App
 from iveg.cli.running import run_until_stopped
 from iveg.cli.serve import serve
 from iveg.domain.errors import IvegError
 from iveg.settings import Settings
+from iveg.vital.supervision import Work
 
 DOOM = "doom"
 """The file, in the directory of the program."""
 
 
-class Doomed(Dss):
+class Doomed(App):
     """An iVeg with two faults."""
 
     _drawn = False

@@ -12,14 +12,8 @@ from typing import TypeVar
 import aiomqtt
 
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.domain.feedback import CLEAR, Feedback, SpeedLimit
-from iveg.domain.observations import (
-    CommandAnswer,
-    Observation,
-    Odometry,
-    Origin,
-    SafetyReport,
-)
+from iveg.domain.feedback import CLEAR, Feedback
+from iveg.domain.observations import Observation, Odometry, Origin, SafetyReport
 from iveg.ngsi import codec
 from tests.brokers import broker_on
 from tests.patience import PATIENCE_S
@@ -49,11 +43,9 @@ class Cloud:
     """Hears everything, answers with feedback at 10 Hz."""
 
     address: BrokerAddress
-    speed_limits: dict[str, SpeedLimit] = field(default_factory=dict)
     heard: dict[str, list[Observation]] = field(
         default_factory=lambda: defaultdict(list)
     )
-    answers: list[CommandAnswer] = field(default_factory=list)
     devices: set[str] = field(default_factory=set)
     problems: list[codec.UnreadPart] = field(default_factory=list)
 
@@ -120,7 +112,7 @@ class Cloud:
                 feedback = Feedback(
                     robot_id,
                     Origin("cloud", seq),
-                    speed_limits=dict.fromkeys(self.heard, CLEAR) | self.speed_limits,
+                    speed_limits=dict.fromkeys(self.heard, CLEAR),
                     seen=seen,
                 )
                 self.link.enqueue(

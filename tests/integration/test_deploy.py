@@ -7,11 +7,11 @@ import shutil
 import signal
 import socket
 import subprocess
-import sys
 from collections import defaultdict
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import aiomqtt
 import pytest
@@ -24,6 +24,7 @@ from tests.bonds import bound
 from tests.http_servers import Request, Response, http_server
 from tests.ports import free_ports
 from tests.processes import ROOT, children_of, until
+from tests.unit.test_compose import env_of, make_secrets
 
 SPY = "spy"
 """Hears and says everything; only the tests know it."""
@@ -87,22 +88,8 @@ def listens(port: int) -> bool:
 
 def make_users(broker: Broker, *more: str) -> None:
     """Users and access list as ``deploy/make-secrets`` makes them, and the spy."""
-    secrets = broker.folder / "secrets"
-    subprocess.run(
-        [
-            *(sys.executable, str(ROOT / "deploy/make-secrets"), "--emulator"),
-            *("--directory", str(secrets), "--state", str(broker.folder / "state")),
-            *more,
-        ],
-        check=True,
-        stdout=subprocess.DEVNULL,
-        timeout=60,
-    )
-    env = dict(
-        line.split("=", 1)
-        for line in (secrets / "env").read_text().splitlines()
-        if line and line[0] != "#"
-    )
+    secrets = make_secrets(broker.folder, "--emulator", *more)
+    env = env_of(secrets)
     robots = (secrets / "mqtt-users").read_text().splitlines()
     broker.passwords = {
         **dict(line.split() for line in robots),
@@ -182,22 +169,14 @@ ELSEWHERE = {
     "/AGIII/iveg/safety",
     "anything",
 }
-TOPICS = sorted(
-    of_robot("AGI")
-    | of_robot("AGII")
-    | AIR
-    | COMMANDS
-    | FEEDBACK
-    | DESIRED
-    | HEARTBEAT
-    | ELSEWHERE
-)
+OF_IVEG = COMMANDS | FEEDBACK | DESIRED | HEARTBEAT
+TOPICS = sorted(of_robot("AGI") | of_robot("AGII") | AIR | OF_IVEG | ELSEWHERE)
 MAY_WRITE = {
     "AGI": of_robot("AGI"),
     "AGII": of_robot("AGII"),
     "climate": AIR,
     "iot_agent": COMMANDS,
-    "iveg_dss": COMMANDS | FEEDBACK | DESIRED | HEARTBEAT,
+    "iveg_dss": OF_IVEG,
     "iveg_emulator": of_robot("AGI") | of_robot("AGII") | AIR,
     "iveg_health": set(),
 }
@@ -412,9 +391,9 @@ async def patient(up: Running, singer: int, tmp_path: Path) -> AsyncIterator[Pat
             "AGENT_SILENT_SINCE": str(tmp_path / "silent-since"),
             "AGENT_SILENCE_MS": "300",
             "AGENT_SINGER_URL": f"http://127.0.0.1:{singer}",
-            "IOTA_NORTH_PORT": str(up.iota_port),
+            "IOTA_NORTH_PORT": str(urlsplit(up.iota_url).port),
             "IOTA_CB_HOST": "127.0.0.1",
-            "IOTA_CB_PORT": str(up.orion_port),
+            "IOTA_CB_PORT": str(urlsplit(up.orion_url).port),
             "IOTA_MQTT_HOST": "127.0.0.1",
             "IOTA_MQTT_PORT": str(up.mqtt_port),
             "IVEG_FIWARE_SERVICE": "agroconnect",

@@ -49,7 +49,7 @@ async def settings(up: Running, page: int, tmp_path: Path) -> Settings:
     await subscribe(up, f"http://127.0.0.1:{page}/ngsi/notifications")
     return Settings(
         port=page,
-        mqtt_url=up.mqtt_url,
+        mqtt_url=f"mqtt://127.0.0.1:{up.mqtt_port}",
         orion_url=up.orion_url,
         iota_url=up.iota_url,
         database_url=database,

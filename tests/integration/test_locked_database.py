@@ -10,7 +10,7 @@ import httpx
 import pytest
 
 from iveg.adapters import clock
-from iveg.app.dss import Dss, open_dss
+from iveg.app import App
 from iveg.asgi import create_app
 from iveg.domain.observations import Received
 from iveg.settings import Settings
@@ -25,7 +25,7 @@ while that lasts, on a machine as busy as it may be."""
 
 
 @asynccontextmanager
-async def running(directory: Path) -> AsyncIterator[tuple[Dss, httpx.AsyncClient]]:
+async def running(directory: Path) -> AsyncIterator[tuple[App, httpx.AsyncClient]]:
     """An iVeg whose neighbours are all away, and a browser before it."""
     mqtt, orion, agent = free_ports(3)
     settings = Settings(
@@ -35,11 +35,11 @@ async def running(directory: Path) -> AsyncIterator[tuple[Dss, httpx.AsyncClient
         iota_url=f"http://127.0.0.1:{agent}",
         sign_in_token="ab" * 32,
     )
-    dss = open_dss(settings, directory)
-    transport = httpx.ASGITransport(create_app(dss))
+    app = App(settings, directory)
+    transport = httpx.ASGITransport(create_app(app))
     browser = httpx.AsyncClient(transport=transport, base_url="http://iveg")
-    async with browser, dss.running():
-        yield dss, browser
+    async with browser, app.running():
+        yield app, browser
 
 
 @contextmanager
@@ -67,30 +67,30 @@ async def press(browser: httpx.AsyncClient) -> httpx.Response:
 async def test_f20_with_a_locked_database_iveg_starts_stops_signs_in_and_judges(
     tmp_path: Path,
 ) -> None:
-    async with running(tmp_path) as (dss, browser):
+    async with running(tmp_path) as (app, browser):
         signed_in = await browser.post(
             "/signin", json={"token": "ab" * 32}, headers=OWN_PAGE
         )
         assert (await press(browser)).status_code == 202
         cookies = {**browser.cookies}
-        await dss.stores.recorder.caught_up()
+        await app.connections.recorder.caught_up.wait()
     assert signed_in.status_code == 204
 
     with ExitStack() as stack:
         stack.enter_context(locked(tmp_path))
-        async with asyncio.timeout(LOCKED_S), running(tmp_path) as (dss, browser):
+        async with asyncio.timeout(LOCKED_S), running(tmp_path) as (app, browser):
             browser.cookies.update(cookies)
             async with asyncio.timeout(LOCKED_S / 2):
-                machine = dss.pipeline.commander.machine("AGI")
+                machine = app.pipeline.commander.machine("AGI")
                 await so(lambda: machine.wants_stop)
                 read = await browser.get("/api/v1/robots")
                 pressed = await press(browser)
-                dss.pipeline.ingest.enqueue(Received(odometry("AGI", 3.0), clock.now()))
-                robot = dss.core.world.robot("AGI")
+                app.pipeline.ingest.enqueue(Received(odometry("AGI", 3.0), clock.now()))
+                robot = app.core.world.robot("AGI")
                 await so(lambda: robot.odometry is not None)
-                judged = dss.pipeline.evaluator.speed_limits["AGI"]
+                judged = app.pipeline.evaluator.speed_limits["AGI"]
 
-            written = dss.stores.recorder.counters["history_written"]
+            written = app.connections.recorder.counters["history_written"]
             stack.close()  # an end that waits for the database is another matter
 
     assert machine.stop is not None

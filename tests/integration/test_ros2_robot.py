@@ -111,7 +111,7 @@ class Sensors:
     async def talk(self) -> None:
         """Say where the base is thirty times a second, as often as ``burst``."""
         while True:
-            stamp = ros.Time.of(clock.wall())
+            stamp = ros.Time.from_seconds(clock.wall())
             odom = ros.Header(stamp, "odom")
             links = (
                 ros.TransformStamped(ros.Header(stamp, "map"), "odom"),

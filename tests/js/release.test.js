@@ -8,8 +8,8 @@ import { equal, test } from "./harness.js";
 
 /** @typedef {import("../../iveg/static/js/panels/release.js").Facts} Facts */
 
-const IVEG = { id: "01A", source: "iveg", ack: "remote" };
-const RED_BUTTON = { id: "hw", source: "hw", ack: "local" };
+const IVEG = /** @type {const} */ ({ id: "01A", source: "iveg", ack: "remote" });
+const RED_BUTTON = /** @type {const} */ ({ id: "hw", source: "hw", ack: "local" });
 const _LINK = { id: "link", source: "link", ack: "auto" };
 const STILL = { linear: 0.001, angular: 0 };
 
@@ -50,7 +50,7 @@ test("a robot that still brakes is not released", () => {
 });
 
 test("a hold that iVeg did not make needs a standing robot all the same", () => {
-  const boot = { id: "boot-1", source: "boot", ack: "remote" };
+  const boot = /** @type {const} */ ({ id: "boot-1", source: "boot", ack: "remote" });
   const held = robot({ mode: "STOPPED", holds: [boot], twist: STILL });
   const rolling = robot({ ...held, twist: { linear: 0.1, angular: 0 } });
   equal(whyNotRelease(facts({ command: undefined, robot: held })), "ok");

@@ -22,9 +22,9 @@ from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld, in_view
-from iveg.lab.experiment.stage import Stage
+from iveg.lab.experiment.stage import Sensing, Stage
 from iveg.ngsi import codec
-from tests.builders import notification
+from tests.builders import ignore, notification
 from tests.unit.vital.desk import settle
 from tests.unit.web.desk import WebDesk
 
@@ -81,16 +81,16 @@ class Field:
             FLEET,
             desk.clock,
             desk.ingest,
+            "all",
+            ignore,
         )
         self.stage = Stage(
             self.world,
-            desk.ingest,
-            desk.loop,
+            desk.parts,
             desk.fleet.told,
             self._move,
             self._hear,
-            looked=self._looked,
-            scan_every=6,
+            Sensing(scan_every=6, looked=self._looked),
         )
 
     # --- the way up -----------------------------------------------------------------

@@ -303,9 +303,9 @@ class AuthorLies(Liar):
             robot = self.field.stage.robots[robot_id]
             lately = [one.speed_limits[robot_id] for one in told[-2 * len(FLEET) :]]
             allowed = max(one.speed_factor for one in lately)
-            assert robot.driving.factor <= allowed, (robot_id, lately)
+            assert robot.factor <= allowed, (robot_id, lately)
             is_stopped = robot_id == "AGI" and self.field.pressed_at is not None
-            held = self.count > _STARTED and robot.driving.factor == 0.0
+            held = self.count > _STARTED and robot.factor == 0.0
             assert is_stopped or not held, robot_id
             topic = self.rnd.choice(FLEET)
             lie = self._all_clear(topic, told[-1])

@@ -6,7 +6,7 @@ Its own reports say all the while that it applies half speed.
 import pytest
 
 from iveg.domain.robot_state import allowed_s, slow_below
-from iveg.lab.emulator.orders import FaultOrder
+from tests.faulty_world import Faults
 from tests.stage import Stage
 
 DEAF = "AGII"
@@ -19,7 +19,7 @@ NOTICED_S = 0.7
 @pytest.mark.slow
 async def test_each_pass_of_a_deaf_robot_is_a_p1_and_never_called_half_speed() -> None:
     stage, waits, accused = Stage("nlos"), list[float](), False
-    stage.happen(FaultOrder(robot=DEAF, deaf=True))
+    stage.happen(DEAF, Faults(deaf=True))
     told_at: float | None = None
     profile = stage.desk.world.robot(DEAF).profile
     for _ in range(STEPS):

@@ -150,7 +150,7 @@ async def test_no_value_in_a_command_on_live_ends_the_line() -> None:
 def test_a_message_on_mqtt_is_taken_clean_or_counted_once(sign: str) -> None:
     heard: list[Received] = []
     intake = Ingest(World(("AGI",)), heard.append, ignore)
-    reader = DirectReader("iveg", ("AGI",), lambda: at(1.0), intake)
+    reader = DirectReader("iveg", ("AGI",), lambda: at(1.0), intake, "all", ignore)
     measure = orjson.loads(codec.write_measure(Navigation("AGI", origin(), "row 4")))
 
     for body in _with(measure, SIGNS[sign]):

@@ -95,7 +95,7 @@ class Robot:
         """Released and resumed by whoever may, at full speed."""
         self.wished = REST
         self.run(1.0)
-        held = [one.id for one in self.node.holds]
+        held = [one.id for one in self.node.machine.holds.holds]
         machine = self.node.machine
         if held:
             self.hear(COMMANDS, release(held, machine.challenge))
@@ -135,7 +135,7 @@ class Robot:
             self._deliver(payload)
 
     def cancel(self) -> None:
-        goal = self.node.goal
+        goal = self.node.goals.goal
         order = CancelOrder("01G0" if goal is None else goal.goal_id)
         self._deliver(codec.write_command(codec.write_goal(order), names.GOAL))
 
@@ -172,10 +172,10 @@ def test_a_goal_is_gone_after_any_hold_and_no_copy_brings_it_back(
     with TemporaryDirectory() as folder:
         robot, before = Robot(Path(folder)), None
         for name in ["drive", *events]:
-            had, told = robot.node.goal, len(robot.told)
+            had, told = robot.node.goals.goal, len(robot.told)
             EVENTS[name](robot)
-            goal = robot.node.goal
-            assert goal is None or robot.node.state == "RUNNING"
+            goal = robot.node.goals.goal
+            assert goal is None or robot.node.machine.state(robot.now) == "RUNNING"
             if name in ("stop", "button", "silence"):
                 assert goal is None
                 # Navigation has been told, unless there was nothing to give up.
@@ -183,7 +183,7 @@ def test_a_goal_is_gone_after_any_hold_and_no_copy_brings_it_back(
             if goal is not None and goal != had:
                 assert name in ("send", "pause")
             before = goal
-        assert before == robot.node.goal
+        assert before == robot.node.goals.goal
 
 
 @settings(max_examples=20)
@@ -199,9 +199,10 @@ def test_with_goals_the_drive_is_told_what_it_is_told_without(
             for robot in robots:
                 EVENTS[name](robot)
             one, other = robots
-            assert one.node.state == other.node.state
-            assert one.node.speed_factor == other.node.speed_factor
-            assert len(one.node.holds) == len(other.node.holds)
+            told, untold = one.node.machine, other.node.machine
+            assert told.state(one.now) == untold.state(other.now)
+            assert told.cap.factor == untold.cap.factor
+            assert len(told.holds.holds) == len(untold.holds.holds)
         spoken = [[one for _, one in _changes(robot)] for robot in robots]
         assert spoken[0] == spoken[1]
 

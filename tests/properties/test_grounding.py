@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from iveg.domain.geometry import Box3D
 from iveg.robot.grounding import (
     DepthPicture,
-    Grounded,
     Grounding,
     Mask,
     Pinhole,
@@ -140,8 +140,8 @@ def test_the_box_holds_every_accepted_point_and_touches_its_extremes(
 
     found = ground(segment(mask, left, top), picture, open_handed)
 
-    assert isinstance(found, Grounded) == bool(len(points))
-    for box in [found.box] if isinstance(found, Grounded) else []:
+    assert isinstance(found, Box3D) == bool(len(points))
+    for box in [found] if isinstance(found, Box3D) else []:
         assert [box.xmin, box.ymin, box.zmin] == points.min(axis=0).tolist()
         assert [box.xmax, box.ymax, box.zmax] == points.max(axis=0).tolist()
         assert box.zmin > 0.0
@@ -159,12 +159,12 @@ def test_a_target_moved_across_the_picture_moves_by_that_many_pixels_in_metres(
         for x, y in ((left, top), (left + right, top + down))
     )
 
-    assert isinstance(unmoved, Grounded)
-    assert isinstance(moved, Grounded)
-    shift = np.subtract(moved.box.centre, unmoved.box.centre)
+    assert isinstance(unmoved, Box3D)
+    assert isinstance(moved, Box3D)
+    shift = np.subtract(moved.centre, unmoved.centre)
     np.testing.assert_allclose(shift, (right / 20, down / 20, 0.0), atol=1e-9)
     low, high = (
-        np.subtract(astuple(moved.box)[side::2], astuple(unmoved.box)[side::2])
+        np.subtract(astuple(moved)[side::2], astuple(unmoved)[side::2])
         for side in (0, 1)
     )
     np.testing.assert_allclose(high, low, atol=1e-9)

@@ -27,8 +27,8 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from iveg.web.security.requirements import declared_action
 from iveg.web.security.roles import MAY
+from tests.routes import declared_action
 from tests.unit.web.whole import STRANGER, WholeServer, whole_server
 
 EXAMPLES = int(os.environ.get("IVEG_OPENAPI_EXAMPLES", "3"))

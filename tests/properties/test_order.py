@@ -5,7 +5,7 @@ from collections import Counter
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.observations import Odometry
+from iveg.domain.observations import Odometry, Origin
 from iveg.domain.stream_order import StreamOrder
 from iveg.domain.world import World
 from tests.builders import odometry, origin, received
@@ -41,8 +41,8 @@ def test_each_message_is_new_late_or_a_duplicate_and_counted_as_one(
 
 @given(st.lists(st.tuples(st.integers(0, 50), stamps), min_size=1, max_size=60))
 def test_no_stamp_ever_orders_anything(arrived: list[tuple[int, float]]) -> None:
-    told, silent = StreamOrder(), StreamOrder()
+    stamped, silent = StreamOrder(), StreamOrder()
     for seq, stamp_s in arrived:
-        stamped = origin(seq)
-        off = type(stamped)(stamped.boot, seq, "whenever", stamp_s)
-        assert told.judge(off) == silent.judge(type(stamped)(stamped.boot, seq))
+        plain = origin(seq)
+        off = Origin(plain.boot, seq, "whenever", stamp_s)
+        assert stamped.judge(off, 0.0) == silent.judge(Origin(plain.boot, seq), 0.0)

@@ -28,7 +28,7 @@ def oldest_painted(frame_s: float, round_trip_s: float) -> float:
             window.painted(answers.pop(0)[1], now)
         if window.opens_at <= now:
             on_the_way.append((now + round_trip_s / 2, window.next_number, now))
-            window.sent(now)
+            window.sent(1, now)
         if now < next_paint:
             continue
         next_paint += frame_s

@@ -76,7 +76,7 @@ def _apart(one: float, other: float) -> float:
 def hear(one: LaserScan, pose: Pose2D) -> FleetCostmap:
     costmap = FleetCostmap("AGI", BODY, ROOM)
     told = replace(peer_scan_of(one, pose, 0.1), origin=origin())
-    costmap.hear(TOPIC, codec.write_peer_scan(told), FAR_OFF, None)
+    costmap.receive(TOPIC, codec.write_peer_scan(told), FAR_OFF, None)
     return costmap
 
 
@@ -149,13 +149,14 @@ def test_whatever_a_peers_scan_says_no_factor_changes(
     node: RobotNode, payloads: list[bytes]
 ) -> None:
     costmap = FleetCostmap("AGI", BODY, ROOM)
-    node.hear_peer_scans(lambda topic, one: costmap.hear(topic, one, FAR_OFF, None))
-    before = node.speed_factor, node.state, node.holds
+    node.on_peer_scan(lambda topic, scan: costmap.receive(topic, scan, FAR_OFF, None))
+    machine = node.machine
+    before = machine.cap, machine.state(0.0), machine.holds
 
     for payload in payloads:
         node._on_message(TOPIC, payload)
     drawn = costmap.draw(costmap.drain_scans(), (), FAR_OFF, 0.0)
 
-    assert (node.speed_factor, node.state, node.holds) == before
+    assert (machine.cap, machine.state(0.0), machine.holds) == before
     assert drawn.data.min() >= -1
     assert drawn.data.max() <= 100

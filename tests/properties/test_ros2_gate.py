@@ -75,7 +75,7 @@ class Gate:
 
     def on_wish(self, forward: float, turn: float, back_s: float) -> None:
         twist = ros.Twist(ros.Vector3(forward), ros.Vector3(z=turn))
-        stamp = ros.Time.of(WALL + self.rig.now + back_s)
+        stamp = ros.Time.from_seconds(WALL + self.rig.now + back_s)
         self.on_junk(cdr.write(ros.TwistStamped(ros.Header(stamp), twist)))
 
     def on_junk(self, payload: bytes) -> None:

@@ -8,6 +8,7 @@ disk.
 
 import asyncio
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from random import Random
 
@@ -50,11 +51,14 @@ class Disk:
         for robot_id, _, named, challenge in journal.named_lines:
             if robot_id in self.wanted:
                 self.wanted[robot_id] = replace(
-                    self.wanted[robot_id], named=named, asked=named, challenge=challenge
+                    self.wanted[robot_id],
+                    named=named,
+                    open_release=named,
+                    challenge=challenge,
                 )
 
     def left_open(self) -> list[CommandRecord]:
-        """As ``Queries.open_commands``."""
+        """As ``Queries.left_open``."""
         return [
             row
             for row in self.commands.values()
@@ -124,14 +128,9 @@ class Life(Desk):
         try:
             await self.commander.release("AGI", self.holds, "ana", self.clock())
         except CommandRefusedError:
-            await self._resume()
+            with suppress(CommandRefusedError):
+                await self.commander.resume("AGI", "ana", self.clock())
         await settle()
-
-    async def _resume(self) -> None:
-        try:
-            await self.commander.resume("AGI", "ana", self.clock())
-        except CommandRefusedError:
-            return
 
     async def silence(self) -> None:
         await self.wait(2.4)

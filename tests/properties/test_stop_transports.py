@@ -60,8 +60,7 @@ class Transport(Channel):
     def put(self, message: object) -> None:
         if self._rnd.random() < self.sky.lost:
             return
-        copies = 1 + (self._rnd.random() < self.sky.doubled)
-        for _ in range(copies):
+        for _ in range(1 + (self._rnd.random() < self.sky.doubled)):
             due = self._rig.now + self._rnd.uniform(0.0, self.sky.late_s)
             self._due.append((due, message))
 
@@ -71,11 +70,10 @@ class Transport(Channel):
 
     def arrived(self) -> Iterable[object]:
         now = self._rig.now
-        gone = sorted(
-            (one for one in self._due if one[0] <= now), key=lambda one: one[0]
-        )
+        self._due.sort(key=lambda one: one[0])
+        gone = [message for due, message in self._due if due <= now]
         self._due = [one for one in self._due if one[0] > now]
-        return [message for _, message in gone]
+        return gone
 
 
 class Late(Watched):
@@ -93,9 +91,8 @@ class Late(Watched):
 
     def clear(self, *names: str) -> None:
         """From now on these are prompt; what is under way stays late."""
-        for name, way in self.ways.items():
-            if name in names:
-                way.sky = PROMPT
+        for name in names:
+            self.ways[name].sky = PROMPT
 
     def perform(self, effects: list[Effect]) -> None:
         for effect in effects:
@@ -110,10 +107,10 @@ class Late(Watched):
         # A new iVeg knows of old releases what the journal says, which is the names.
         self.forgotten = set(self.reported_released)
         self.ended.clear()
-        asked = self.disk.asked
+        named = self.disk.open_release
         super().iveg_restarts()
         again = self.iveg.hold_id
-        assert again not in self.named or len(asked) >= LIMITS.most_holds
+        assert again not in self.named or len(named) >= LIMITS.most_holds
 
     def the_robot_reboots(self) -> None:
         super().the_robot_reboots()
@@ -228,7 +225,7 @@ def test_the_late_refusal_of_one_attempt_changes_nothing_of_the_next(seed: int) 
     assert rig.until("STANDING", limit_s=8.0)
     early = refusals(rig)
     rig.somebody_releases()
-    first = rig.iveg.once
+    first = rig.iveg.order
     rig.rig.machine.local_hold("hw", rig.now)  # its challenge changes on the way
     rig.run_for(rnd.choice((0.1, 0.2)))
     assert first is not None
@@ -237,10 +234,10 @@ def test_the_late_refusal_of_one_attempt_changes_nothing_of_the_next(seed: int) 
     rig.run_for(rnd.choice((0.1, 0.5)))
 
     rig.somebody_releases()
-    second = rig.iveg.once
+    second = rig.iveg.order
     for refusal in early:
         rig.hear(refusal, FIWARE.id)
-    assert rig.iveg.once == second is not None
+    assert rig.iveg.order == second is not None
     rig.run_for(1.0)
 
     assert early

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.tracking.person import RADIUS_M, SURELY_FROM, Thing
+from iveg.domain.tracking.things import RADIUS_M, SURELY_FROM, Thing
 from tests.builders import at
 from tests.unit.domain.scene import Scene, person
 

@@ -6,15 +6,16 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import LaserScan, Origin
-from iveg.domain.witness import Outline, Plan
+from iveg.domain.witness import Plan
 from iveg.robot.judgement import Limits
 from tests.unit.robot.rig import AHEAD, Rig, person
 
 BEAMS = 24
-PLANS = (None, Plan.of(Greenhouse("g", Rectangle(-9.0, -9.0, 9.0, 9.0))))
+PLANS = (None, Plan.from_greenhouse(Greenhouse("g", Rectangle(-9.0, -9.0, 9.0, 9.0))))
 _RANGE = st.sampled_from((0.0, 0.05, 0.6, 1.4, 2.2, 2.9, 8.0, math.inf, math.nan, 1e30))
 _STEP = st.tuples(
     st.sampled_from((-2.5, 0.0, 0.3)),
@@ -27,7 +28,7 @@ _STEP = st.tuples(
 def test_no_scan_makes_a_robot_faster(
     plan: Plan | None, run: list[tuple[float, bool, list[float] | None]]
 ) -> None:
-    limits = Limits(outline=Outline(1.0, 0.7), plan=plan)
+    limits = Limits(RobotProfile(length=1.0, width=0.7), plan=plan)
     blind, sighted = Rig().drive_on(), Rig(limits=limits).drive_on()
     for x, somebody, ranges in run:
         for rig in (blind, sighted):

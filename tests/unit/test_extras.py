@@ -9,7 +9,7 @@ import pytest
 
 from iveg.adapters.extras import EXTRAS
 from iveg.adapters.history.engine import writing_engine
-from iveg.app.outside import open_provider
+from iveg.app import open_provider
 from iveg.cli import UNUSABLE, main
 from iveg.domain.errors import MissingExtraError
 from iveg.settings import Settings
@@ -81,7 +81,7 @@ def test_an_identity_provider_without_its_extra_names_the_setting(
     without: str, tmp_path: Path
 ) -> None:
     settings = Settings(
-        sso_issuer="https://idm.test", sso_client_id="iveg", sso_roles=("a=viewer",)
+        sso_issuer="https://a.test", sso_client_id="b", sso_roles=(("c", "viewer"),)
     )
 
     with pytest.raises(MissingExtraError, match=r"IVEG_SSO_ISSUER.*iveg\[sso\]"):

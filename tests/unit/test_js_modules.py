@@ -1,6 +1,7 @@
 """The front end's own modules, tested where they run: in a browser."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -60,9 +61,10 @@ class Files(SimpleHTTPRequestHandler):
         """Says nothing."""
 
 
-@pytest.fixture(scope="module")
-def files() -> Iterator[str]:
-    handler = partial(Files, directory=str(_ROOT))
+@contextmanager
+def served(connect: str = "") -> Iterator[str]:
+    """The address of these files."""
+    handler = partial(Files, directory=str(_ROOT), connect=connect)
     server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
     thread = Thread(target=server.serve_forever, name="files")
     thread.start()
@@ -70,6 +72,12 @@ def files() -> Iterator[str]:
     server.shutdown()
     thread.join()
     server.server_close()
+
+
+@pytest.fixture(scope="module")
+def files() -> Iterator[str]:
+    with served() as address:
+        yield address
 
 
 @pytest.fixture(scope="module")

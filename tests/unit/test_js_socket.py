@@ -7,9 +7,7 @@ instead of waiting (``page.clock``).
 import json
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import partial
 from http import HTTPStatus
-from http.server import ThreadingHTTPServer
 from pathlib import Path
 from socket import SHUT_RDWR
 from threading import Thread
@@ -25,7 +23,7 @@ from websockets.typing import Subprotocol
 
 from iveg.web.live.feed import SUBPROTOCOL
 from tests.browsers import running_browser
-from tests.unit.test_js_modules import Files
+from tests.unit.test_js_modules import served
 
 _ROOT = Path(__file__).parents[2]
 _PATIENCE_MS = 30_000
@@ -142,15 +140,8 @@ def _send(connection: ServerConnection, topic: str, data: dict[str, Any]) -> Non
 
 @pytest.fixture(scope="module")
 def files() -> Iterator[str]:
-    server = ThreadingHTTPServer(
-        ("127.0.0.1", 0), partial(Files, directory=str(_ROOT), connect="ws: http:")
-    )
-    thread = Thread(target=server.serve_forever, name="files")
-    thread.start()
-    yield f"http://127.0.0.1:{server.server_port}"
-    server.shutdown()
-    thread.join()
-    server.server_close()
+    with served("ws: http:") as address:
+        yield address
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ import pytest
 from iveg.adapters.fleet_files import load_fleet
 from iveg.domain.errors import SettingsError
 from iveg.domain.parameters import Parameters
+from iveg.domain.recordings import RecordingLimits
 from iveg.settings import Settings
 
 _SHARE = "a number from 0 to 1, also by class (2,robot=3)"
@@ -193,6 +194,13 @@ def test_an_identity_provider_is_told_with_all_that_it_needs(
         Settings.from_environment(environment)
 
     assert "u:p" not in str(caught.value)
+
+
+def test_inputs_and_pictures_have_limits_of_their_own() -> None:
+    settings = Settings.from_environment({"IVEG_KEEP_RECORDINGS_DAYS": "3"})
+    limits = RecordingLimits(3, 6 * 10**9), RecordingLimits(3, 4 * 10**9)
+
+    assert settings.limits_of_recordings == limits
 
 
 def test_every_setting_can_be_set() -> None:

@@ -1,8 +1,8 @@
 """Connections to the history database, and its migrations; the same on both kinds.
 
-SQLite keeps a rollback journal: WAL maps a file into memory, and whoever cuts that file
-ends every process that has it mapped.  Readers wait for the commit of a batch instead.
-The driver's own hidden transactions are off, so that one begins where we say so.
+SQLite uses a rollback journal: WAL maps a file into memory, and a program that cuts
+that file ends every process that has mapped it.  So readers wait for the commit of a
+batch.  The driver's hidden transactions are off: the code begins each transaction.
 
 The migrations lie beside the package in a checkout and inside it when installed.  Each
 start calls ``upgrade``: nothing to do costs a few milliseconds.
@@ -10,6 +10,7 @@ start calls ``upgrade``: nothing to do costs a few milliseconds.
 
 import logging
 import sqlite3
+from contextlib import closing
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
@@ -37,7 +38,7 @@ _POSTGRESQL = {
     "keepalives_idle": 5,
     "keepalives_interval": 2,
     "keepalives_count": 3,
-    # A failed-over server goes silent; without this a commit waits for minutes.
+    # A failed-over server goes silent; without these values a commit waits for minutes.
     "tcp_user_timeout": 10_000,
     "application_name": "iveg",
 }
@@ -57,7 +58,7 @@ def sqlite_file(database_url: str) -> Path | None:
     """The file that an address names; None when it is a server's.
 
     Raises:
-        SettingsError: not an address, or SQLite in memory, which forgets.
+        SettingsError: not an address, or SQLite in memory, which keeps nothing.
     """
     url = _parse(database_url)
     if url.get_backend_name() != "sqlite":
@@ -67,16 +68,11 @@ def sqlite_file(database_url: str) -> Path | None:
     return Path(str(url.database))
 
 
-def describe(database_url: str) -> str:
-    """The address for people and logs, without its password."""
-    return _parse(database_url).render_as_string(hide_password=True)
-
-
 def writing_engine(database_url: str) -> Engine:
-    """For the one writer: its transactions take the write lock as they begin.
+    """Engine of the one writer: its transactions take the write lock as they begin.
 
-    ``BEGIN IMMEDIATE`` waits its turn at the start; a transaction that finds out
-    half-way that it must write cannot wait at all.
+    ``BEGIN IMMEDIATE`` waits for the lock at the start.  A transaction that first reads
+    and then writes could not wait for it.
     """
     engine = _engine(database_url, "BEGIN IMMEDIATE", "-c lock_timeout=5s", QueuePool)
     if engine.dialect.name == "sqlite":
@@ -85,8 +81,8 @@ def writing_engine(database_url: str) -> Engine:
 
 
 def reading_engine(database_url: str) -> Engine:
-    """For readers: short transactions, given up when they take too long."""
-    # None idles: a file that was moved aside must not live on in one.
+    """Engine of readers: short transactions, which end when they take too long."""
+    # No idle connections: they would go on reading a file that was moved aside.
     return _engine(database_url, "BEGIN", "-c statement_timeout=20s", NullPool)
 
 
@@ -97,7 +93,7 @@ def _engine(database_url: str, begin: str, options: str, pool: type[Pool]) -> En
         url = url.set(query={"timeout": str(_BUSY_TIMEOUT_S), **url.query})
         engine = create_engine(url, poolclass=pool)
         event.listen(engine, "connect", _prepare_sqlite)
-        event.listen(engine, "begin", lambda one: one.exec_driver_sql(begin))
+        event.listen(engine, "begin", lambda c: c.exec_driver_sql(begin))
         return engine
     try:
         return create_engine(
@@ -111,8 +107,8 @@ def _engine(database_url: str, begin: str, options: str, pool: type[Pool]) -> En
             connect_args=_POSTGRESQL | {"options": options},
         )
     except ModuleNotFoundError as error:
-        wanted = "psycopg", "postgresql"
-        raise MissingExtraError("IVEG_DATABASE_URL", *wanted) from error
+        library_and_extra = "psycopg", "postgresql"
+        raise MissingExtraError("IVEG_DATABASE_URL", *library_and_extra) from error
 
 
 def _prepare_sqlite(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:
@@ -121,7 +117,7 @@ def _prepare_sqlite(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None
 
 
 def _leave_wal(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:
-    """Turn a file that an earlier version wrote in WAL into one without."""
+    """Convert a file that an earlier version wrote in WAL mode."""
     connection.cursor().execute("PRAGMA journal_mode=DELETE")
 
 
@@ -141,7 +137,7 @@ _log = logging.getLogger(__name__)
 _CHECK_LIMIT_S = 5.0
 _STEPS_BETWEEN_LOOKS = 100_000
 _ONE_AT_A_TIME = 0x69566567
-"""Any fixed number: the PostgreSQL lock that two starts at once would fight for."""
+"""PostgreSQL lock (any fixed number) that lets one start upgrade at a time."""
 
 
 def upgrade(database_url: str) -> None:
@@ -158,7 +154,8 @@ def upgrade(database_url: str) -> None:
     engine = writing_engine(database_url)
     try:
         with engine.connect() as connection, connection.begin():
-            _upgrade(connection, describe(database_url))
+            address = _parse(database_url).render_as_string(hide_password=True)
+            _upgrade(connection, address)
     except OperationalError as error:
         raise HopError("database", reason_of(error)) from error
     finally:
@@ -184,36 +181,35 @@ def migrations_directory() -> Path:
 
 def revisions(connection: Connection) -> tuple[str | None, list[str]]:
     """The revision of a database, and all that this version knows, newest first."""
-    found = MigrationContext.configure(connection).get_current_revision()
-    return found, list(_known(migrations_directory()))
+    revision = MigrationContext.configure(connection).get_current_revision()
+    return revision, list(_known(migrations_directory()))
 
 
 @cache
 def _known(directory: Path) -> tuple[str, ...]:
-    """All revisions, newest first; to load them takes longer than most else here."""
-    steps = ScriptDirectory(str(directory))
-    return tuple(step.revision for step in steps.walk_revisions())
+    """All revisions, newest first; cached, as loading them is slow."""
+    scripts = ScriptDirectory(str(directory))
+    return tuple(script.revision for script in scripts.walk_revisions())
 
 
 def reason_of(error: Exception) -> str:
-    """The driver's error in one line, without statement and parameters."""
-    cause = getattr(error, "orig", None) or error
-    return " ".join(str(cause).split())
+    """Driver's error in one line, without statement and parameters."""
+    return " ".join(str(getattr(error, "orig", None) or error).split())
 
 
 def _upgrade(connection: Connection, where: str) -> None:
     if connection.dialect.name == "postgresql":
         lock = text("SELECT pg_advisory_xact_lock(:key)")
         connection.execute(lock, {"key": _ONE_AT_A_TIME})
-    found, known = revisions(connection)
-    if found == known[0]:
+    revision, known = revisions(connection)
+    if revision == known[0]:
         return
-    if found is not None and found not in known:
+    if revision is not None and revision not in known:
         raise DataFileError(
             where,
             "",
-            f"its history was written by a newer iVeg (revision {found}); start that "
-            "version, or name another database in IVEG_DATABASE_URL",
+            f"its history was written by a newer iVeg (revision {revision}); start "
+            "that version, or name another database in IVEG_DATABASE_URL",
         )
     try:
         command.upgrade(alembic_config(connection), "head")
@@ -232,48 +228,45 @@ def _prepare_file(file: Path) -> None:
         damage = damage_of(file) if file.exists() else None
         if damage is not None:
             _move_aside(file, damage)
-        # SQLite gives the files beside it the rights of the database.
+        # SQLite gives files beside the database its rights.
         make_private(file)
         for suffix in _BESIDE:
-            beside = file.with_name(file.name + suffix)
-            if beside.exists():
-                make_private(beside)
+            neighbour = file.with_name(file.name + suffix)
+            if neighbour.exists():
+                make_private(neighbour)
     except OSError as error:
         raise HopError("database", f"{file}: {error.strerror}") from error
 
 
 def damage_of(file: Path) -> str | None:
-    """Damage of a file's structure; None when none was found in 5 s.
+    """Damage of a file's structure; None where a check of 5 s finds none.
 
-    A locked file is not a damaged one; later calls deal with it.
+    A locked file is not damaged; later calls wait for it or fail.
     """
     deadline = clock.mono() + _CHECK_LIMIT_S
-    connection = sqlite3.connect(file, isolation_level=None)
-    connection.set_progress_handler(
-        lambda: clock.mono() > deadline, _STEPS_BETWEEN_LOOKS
-    )
-    try:
-        answer = connection.execute("PRAGMA quick_check(1)").fetchone()
-    except sqlite3.OperationalError:
-        return None
-    except sqlite3.DatabaseError as error:
-        return str(error)
-    finally:
-        connection.close()
+    with closing(sqlite3.connect(file, isolation_level=None)) as connection:
+        connection.set_progress_handler(
+            lambda: clock.mono() > deadline, _STEPS_BETWEEN_LOOKS
+        )
+        try:
+            answer = connection.execute("PRAGMA quick_check(1)").fetchone()
+        except sqlite3.OperationalError:
+            return None
+        except sqlite3.DatabaseError as error:
+            return str(error)
     return None if answer == ("ok",) else str(answer[0])
 
 
 def _move_aside(file: Path, damage: str) -> None:
-    moment = datetime.fromtimestamp(clock.wall(), UTC)
-    mark = f".corrupt-{moment:%Y%m%dT%H%M%S%f}"
-    # What lies beside it goes along: left behind, it would play into the new one.
+    mark = f".corrupt-{datetime.fromtimestamp(clock.wall(), UTC):%Y%m%dT%H%M%S%f}"
+    # Files beside it go along: SQLite would apply a journal to the new database.
     for part in ("", *_BESIDE):
         old = file.with_name(file.name + part)
         if old.exists():
             old.rename(file.with_name(file.name + mark + part))
     _log.error(
         "The history in %s is damaged (%s). It was moved aside as %s and a new one "
-        "begins; the past is missing until it is restored.",
+        "begins; earlier rows are missing until it is restored.",
         file,
         damage,
         file.name + mark,

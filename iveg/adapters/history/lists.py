@@ -1,7 +1,7 @@
 """Lists of records, newest first, in pages that stay in step while rows are added.
 
 A page ends in a cursor that names its last row, not a count of rows, so that neither
-new rows nor deep pages make the next one wrong or slow.
+new rows nor deep pages make the next page wrong or slow.
 """
 
 import base64
@@ -45,11 +45,11 @@ R = TypeVar("R", bound=Record)
 
 @dataclass(frozen=True, slots=True)
 class ListOf(Generic[R]):
-    """Listing of one kind of record.
+    """List of one kind of record.
 
     Attributes:
-        classes: Columns that the class filter looks at.
-        which: Rows that are in the list at all; None: every one of the table.
+        classes: Columns of the class filter.
+        which: Condition of the rows in the list; None: every row of the table.
     """
 
     kind: type[R]
@@ -68,7 +68,7 @@ class ListOf(Generic[R]):
 
     @property
     def key(self) -> Column[Any]:
-        """The column that settles equal times."""
+        """The column that orders rows of the same time."""
         return TABLE_MAPPINGS[self.kind].key
 
 
@@ -90,7 +90,7 @@ AUDIT = ListOf(AuditRecord, ("action", "name"))
 
 @dataclass(frozen=True, slots=True)
 class Cursor:
-    """Last row of a page: its time, and what tells it from others of that time."""
+    """Last row of a page: its time (Unix s) and its key among rows of that time."""
 
     at: float
     key: int | str
@@ -103,10 +103,10 @@ def write_cursor(cursor: Cursor) -> str:
 
 
 def read_cursor(text: str, listed: ListOf[R]) -> Cursor:
-    """A cursor that ``write_cursor`` wrote for a list with such keys.
+    """Read a cursor of ``write_cursor`` for a list with such keys.
 
     Raises:
-        UnreadableError: it did not.
+        UnreadableError: the text is no such cursor.
     """
     try:
         padded = text.encode("ascii") + b"=" * (-len(text) % 4)
@@ -119,7 +119,7 @@ def read_cursor(text: str, listed: ListOf[R]) -> Cursor:
 
 
 def _is_key(key: object, listed: ListOf[R]) -> bool:
-    # Only what a column can hold: the rest would fail inside the database.
+    # Only values that a column can hold: others would fail inside the database.
     if listed.key.type.python_type is int:
         return type(key) is int and 0 <= key < 2**63
     return isinstance(key, str) and key.isascii() and key.isprintable()
@@ -132,13 +132,13 @@ USUAL_ROWS, MOST_ROWS = 100, 1000
 class Filter:
     """Conditions on the rows of a list; None: any.
 
-    One on a field that the rows lack holds for each of them.
+    A condition on a field that the rows lack holds for every row.
 
     Attributes:
-        since: Inclusive; ``until`` exclusive (Unix seconds).
-        class_: Canonical class, or class as the detector said.
+        since: Start, inclusive; ``until`` is exclusive (Unix s).
+        class_: Canonical class, or the detector's class.
         person: Id of a person.
-        min_probability: Inclusive, 0 to 1.
+        min_probability: Least probability, 0 to 1, inclusive.
         limit: Rows of a page.
     """
 
@@ -154,7 +154,7 @@ class Filter:
 
 @dataclass(frozen=True, slots=True)
 class Page(Generic[R]):
-    """Some rows, newest first, and where the next page starts; None at the end."""
+    """Rows of a page, newest first, and the cursor of the next; None at the end."""
 
     items: tuple[R, ...]
     next: Cursor | None
@@ -163,6 +163,7 @@ class Page(Generic[R]):
 def read_page(connection: Connection, listed: ListOf[R], wanted: Filter) -> Page[R]:
     """One page of a list."""
     limit = min(max(wanted.limit, 1), MOST_ROWS)
+    # One row more tells whether another page follows.
     statement = (
         select(listed.table)
         .where(*conditions(listed, wanted))
@@ -186,12 +187,16 @@ def conditions(listed: ListOf[R], wanted: Filter) -> Iterator[ColumnElement[bool
     if wanted.until is not None:
         yield listed.at < wanted.until
     columns = listed.table.c
-    robot = columns.get("robot_id", columns.get("subject"))
-    if wanted.robot is not None and robot is not None:
-        yield robot == wanted.robot
-    person = columns.get("person_id", columns.get("person"))
-    if wanted.person is not None and person is not None:
-        yield person == wanted.person
+    # Tables have either name of these columns.
+    named = {
+        "robot_id": wanted.robot,
+        "subject": wanted.robot,
+        "person_id": wanted.person,
+        "person": wanted.person,
+    }
+    for name, value in named.items():
+        if value is not None and name in columns:
+            yield columns[name] == value
     if wanted.class_ is not None and listed.classes:
         yield or_(*(columns[name] == wanted.class_ for name in listed.classes))
     probability = columns.get("probability", columns.get("confidence"))
@@ -203,7 +208,7 @@ def conditions(listed: ListOf[R], wanted: Filter) -> Iterator[ColumnElement[bool
 
 
 def record_of(kind: type[R], row: RowMapping) -> R:
-    """A row as the record that was offered; what a damaged row lacks is its default."""
+    """The record of a row; a member that a damaged row lacks has its default."""
     table = TABLE_MAPPINGS[kind].table
-    values = {one.key: row[table.c[one.key]] for one in COLUMNS[kind]}
-    return kind(**{key: one for key, one in values.items() if one is not None})
+    values = {column.key: row[table.c[column.key]] for column in COLUMNS[kind]}
+    return kind(**{key: value for key, value in values.items() if value is not None})

@@ -1,13 +1,15 @@
-"""The history's reading side: queries of the REST API, and what earlier versions kept.
+"""The history's reading side: queries of the REST API, and tables of earlier versions.
 
-Every query runs in a thread of its own small pool, so that a long query neither holds
-up the event loop nor takes the threads that a STOP's journal needs.  Accounts and
-tokens of earlier versions are copied once; their tables stay for one version more.
+Queries run in a small pool of threads, so that a long query neither holds up the event
+loop nor takes the thread of the STOP's journal.  Accounts and tokens of earlier
+versions are copied once; their tables stay for one more version.
 """
 
 import asyncio
+import math
 from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -35,12 +37,11 @@ from iveg.adapters.history.tables import (
     command_events,
 )
 from iveg.domain.accounts import Access, Account, ApiToken
+from iveg.domain.alerts import MOST_KEPT
 from iveg.domain.errors import HopError
 from iveg.domain.records import (
     AlertRecord,
     CommandEventRecord,
-    CommandRecord,
-    DecisionRecord,
 )
 
 P = ParamSpec("P")
@@ -53,7 +54,7 @@ def ask(
     *args: P.args,
     **named: P.kwargs,
 ) -> T:
-    """The answer of a database.
+    """Answer of a database to a question.
 
     Raises:
         HopError: it does not answer.
@@ -71,7 +72,7 @@ def ask_once(
     *args: P.args,
     **named: P.kwargs,
 ) -> T:
-    """Answer of a database that is asked nothing else."""
+    """Answer of a database to a single question, over a connection of its own."""
     engine = reading_engine(url)
     try:
         return ask(engine, question, *args, **named)
@@ -88,7 +89,7 @@ class Queries:
     Every method raises ``HopError`` when the database does not answer.
 
     Attributes:
-        url: The database, for a process that asks it itself.
+        url: Address of the database, for other processes.
     """
 
     def __init__(self, database_url: str) -> None:
@@ -102,9 +103,9 @@ class Queries:
         *args: P.args,
         **named: P.kwargs,
     ) -> T:
-        """Answer of a question, such as ``series_of`` of ``series``."""
+        """Answer to a question, such as ``series_of`` of ``series``."""
         work = partial(ask, self._engine, question, *args, **named)
-        return await asyncio.get_running_loop().run_in_executor(self._threads, work)
+        return await asyncio.wrap_future(self._threads.submit(work))
 
     async def page(self, listed: ListOf[R], wanted: Filter) -> Page[R]:
         """One page of a list."""
@@ -113,59 +114,65 @@ class Queries:
     async def pages(
         self, listed: ListOf[R], first: Page[R], wanted: Filter
     ) -> AsyncIterator[Sequence[R]]:
-        """Rows of the first page that was asked for so, and of all after it."""
+        """Rows of the page ``first``, and of all pages after it."""
         page = first
         yield page.items
         while page.next is not None:
             page = await self.page(listed, replace(wanted, cursor=page.next))
             yield page.items
 
-    async def one(self, listed: ListOf[R], key: str) -> R | None:
-        """The record of that key; None when it is not known."""
-        wanted = select(listed.table).where(listed.key == key)
-        return next(iter(await self.ask(_records, listed.kind, wanted)), None)
+    async def rows(
+        self, listed: ListOf[R], wanted: Filter, most: float = math.inf
+    ) -> list[R]:
+        """Rows of a list, newest first, up to the page that reaches ``most``."""
+        rows: list[R] = []
+        async for page in self.pages(listed, await self.page(listed, wanted), wanted):
+            rows += page
+            if len(rows) >= most:
+                break
+        return rows
 
-    async def open_commands(self) -> tuple[CommandRecord, ...]:
-        """Commands that still go on, oldest first."""
-        return await self._open(lists.COMMANDS)
+    async def get(self, listed: ListOf[R], key: str) -> R | None:
+        """The record with this key; None where it is unknown."""
+        statement = select(listed.table).where(listed.key == key)
+        return next(iter(await self.ask(_records, listed.kind, statement)), None)
 
-    async def open_decisions(self) -> tuple[DecisionRecord, ...]:
-        """Decisions without an end, oldest first."""
-        return await self._open(lists.DECISIONS)
+    async def left_open(self, listed: ListOf[R]) -> tuple[R, ...]:
+        """Open commands, decisions or alerts (``OPEN``), oldest first."""
+        statement = (
+            select(listed.table)
+            .where(OPEN[listed.table])
+            .order_by(listed.at, listed.key)
+        )
+        return await self.ask(_records, listed.kind, statement)
 
-    async def open_alerts(self) -> tuple[AlertRecord, ...]:
-        """Active alerts, oldest first."""
-        return await self._open(lists.ALERTS)
-
-    async def _open(self, listed: ListOf[R]) -> tuple[R, ...]:
-        is_open = select(listed.table).where(OPEN[listed.table])
-        wanted = is_open.order_by(listed.at, listed.key)
-        return await self.ask(_records, listed.kind, wanted)
-
-    async def unseen_alerts(self, most: int) -> tuple[AlertRecord, ...]:
-        """The newest P1s that nobody has acknowledged, active or over."""
+    async def unseen_alerts(self) -> tuple[AlertRecord, ...]:
+        """The newest unacknowledged P1 alerts, active or cleared."""
         a = alerts.c
-        unseen = select(alerts).where(a.priority == "P1", a.acknowledged_at.is_(None))
-        wanted = unseen.order_by(a.last_raised_at.desc(), a.alert_id.desc()).limit(most)
-        return await self.ask(_records, AlertRecord, wanted)
+        newest = (
+            select(alerts)
+            .where(a.priority == "P1", a.acknowledged_at.is_(None))
+            .order_by(a.last_raised_at.desc(), a.alert_id.desc())
+        )
+        return await self.ask(_records, AlertRecord, newest.limit(MOST_KEPT))
 
     async def steps_of(
         self, command_ids: Sequence[str]
     ) -> dict[str, list[CommandEventRecord]]:
-        """The audit trails of some commands, each oldest first."""
+        """Steps of some commands, oldest first."""
         events = command_events.c
-        wanted = (
+        statement = (
             select(command_events)
             .where(events.command_id.in_(command_ids))
             .order_by(events.at, events.row_id)
         )
         steps: dict[str, list[CommandEventRecord]] = {}
-        for step in await self.ask(_records, CommandEventRecord, wanted):
+        for step in await self.ask(_records, CommandEventRecord, statement):
             steps.setdefault(step.command_id, []).append(step)
         return steps
 
     def close(self) -> None:
-        """Let go of threads and connections."""
+        """End threads and close connections."""
         self._threads.shutdown(wait=False, cancel_futures=True)
         self._engine.dispose()
 
@@ -173,24 +180,20 @@ class Queries:
 def _records(
     connection: Connection, kind: type[R], wanted: Select[Any]
 ) -> tuple[R, ...]:
-    """The rows that a statement finds, as records in its order."""
-    rows = connection.execute(wanted).mappings()
-    return tuple(record_of(kind, row) for row in rows)
+    """Rows of a statement, as records in its order."""
+    return tuple(record_of(kind, row) for row in connection.execute(wanted).mappings())
 
 
 def earlier_access(url: str) -> Access | None:
-    """Rows that are still to be copied; None after that. Raises HopError."""
+    """Accounts and tokens to be copied; None once they are.  Raises HopError."""
     return ask_once(url, _read)
 
 
 def mark_moved(url: str, now: float) -> None:
-    """Note that all is copied (Unix s). Raises HopError."""
+    """Note the time at which all was copied (Unix s).  Raises HopError."""
     mark = text("INSERT INTO access_moved (at) VALUES (:at)")
-    store = Store(url)
-    try:
-        store.run(lambda one: one.execute(mark, {"at": now}))
-    finally:
-        store.close()
+    with closing(Store(url)) as store:
+        store.run(lambda connection: connection.execute(mark, {"at": now}))
 
 
 def _read(connection: Connection) -> Access | None:
@@ -206,5 +209,6 @@ def _read(connection: Connection) -> Access | None:
 
 
 def _rows(connection: Connection, table: Table) -> Sequence[RowMapping]:
-    known = (one for one in table.c if one.key not in ("name_key", "language"))
-    return connection.execute(select(*known)).mappings().all()
+    # `Account` and `ApiToken` have neither of these columns any more.
+    columns = (c for c in table.c if c.key not in ("name_key", "language"))
+    return connection.execute(select(*columns)).mappings().all()

@@ -1,15 +1,14 @@
-"""Moves offered records into the database, without ever making the pipeline wait.
+"""Recorder: moves records into the database, and never makes the pipeline wait.
 
-One task gathers batches, one thread writes them, each in one transaction.  Rows of
-orders go to the journal at once (``flushed``), which holds them until the database has
-them; while it is away, all others wait in a bounded queue, of which the oldest give
-way::
+One task gathers batches, one thread writes each in a transaction.  Rows of orders go to
+the journal at once (``flushed``), which holds them until the database has them.  While
+the database is away, all others wait in a bounded queue whose oldest rows give way::
 
     enqueue ──> queue ──> batch ──> database
        └─ orders ─> journal ─┘  at the next start
 
-Rows of one kind that the database does not take for their values are counted and left
-out, so that they cannot hold up everything behind them.
+Rows whose values the database refuses are counted and left out, with all rows of their
+kind in the batch, so that they cannot hold up everything behind them.
 """
 
 import asyncio
@@ -52,29 +51,29 @@ _VALUE_ERRORS = (ValueError, TypeError, OverflowError)
 
 
 class Store:
-    """The one writer's side of the database; blocks, so it lives in a thread."""
+    """Write access to the database; blocks, so it is used in a thread."""
 
     def __init__(self, database_url: str) -> None:
         self._url = database_url
         self._engine: Engine | None = None
         self.rejected = 0
-        """Rows that the database can never take."""
+        """Rows that the database has refused for their values."""
 
     def write(self, rows: Sequence[Waiting]) -> None:
         """Store a batch; on failure nothing of it is stored.
 
         Raises:
             HopError: the database is away, locked, full or damaged.
-            DataFileError: it cannot be brought to the shape that is written here.
+            DataFileError: it cannot be migrated to the newest schema.
         """
         self.run(lambda connection: self._insert(connection, rows))
 
     def run(self, work: Callable[[Connection], _T]) -> _T:
-        """Other work of the one writer, in a transaction of its own.
+        """Do work in a transaction of its own.
 
         Raises:
             HopError: the database is away, locked, full or damaged.
-            DataFileError: it cannot be brought to the shape that is written here.
+            DataFileError: it cannot be migrated to the newest schema.
         """
         engine = self._ready()
         try:
@@ -88,28 +87,28 @@ class Store:
 
     def _insert(self, connection: Connection, rows: Sequence[Waiting]) -> None:
         for kind, mapping in TABLE_MAPPINGS.items():
-            of_kind = [row for row in rows if type(row.record) is kind]
-            if not of_kind:
+            same = [row for row in rows if type(row.record) is kind]
+            if not same:
                 continue
             try:
                 with connection.begin_nested():
                     statement = _statement(mapping, connection.dialect.name)
-                    connection.execute(statement, _values(of_kind, mapping))
+                    connection.execute(statement, _values(same, mapping))
             except (StatementError, *_VALUE_ERRORS) as error:
                 if not _is_fault_of_row(error, connection.engine):
                     raise
-                self.rejected += len(of_kind)
-                name, why = kind.__name__, reason_of(error)
-                _log.error("history: %d %s not stored: %s", len(of_kind), name, why)
+                self.rejected += len(same)
+                name, reason = kind.__name__, reason_of(error)
+                _log.error("history: %d %s not stored: %s", len(same), name, reason)
 
     def close(self) -> None:
-        """Let go of the connection; the next write makes a new one."""
+        """Close the connection; the next write opens another."""
         if self._engine is not None:
             self._engine.dispose()
             self._engine = None
 
     def _ready(self) -> Engine:
-        # Looking again after every loss heals a file that was damaged or replaced.
+        # A check after every loss repairs a file that was damaged or replaced.
         if self._engine is None:
             upgrade(self._url)
             self._engine = writing_engine(self._url)
@@ -117,7 +116,7 @@ class Store:
 
 
 def _values(rows: Iterable[Waiting], mapping: TableMapping) -> list[_Row]:
-    """Rows as columns; of several states of one thing only the newest."""
+    """Rows as columns; of several states of a thing the newest alone."""
     if not mapping.changes:
         return [_columns(row.record) for row in rows]
     newest: dict[tuple[object, ...], _Row] = {}
@@ -128,7 +127,7 @@ def _values(rows: Iterable[Waiting], mapping: TableMapping) -> list[_Row]:
 
 
 def _columns(record: Record) -> _Row:
-    return {one.key: one.read(record) for one in COLUMNS[type(record)]}
+    return {column.key: column.read(record) for column in COLUMNS[type(record)]}
 
 
 @cache
@@ -148,30 +147,34 @@ def _statement(mapping: TableMapping, dialect: str) -> Insert:
 
 
 def _is_fault_of_row(error: Exception, engine: Engine) -> bool:
-    """Whether the values are the cause; else it is the database, and all can wait."""
+    """Whether values are the cause; if the database is, rows can wait."""
     if isinstance(error, IntegrityError | DataError) or not isinstance(
         error, DBAPIError
     ):
         return True
-    refused = (InterfaceError, ProgrammingError)
-    # Python's SQLite driver reports a type that it cannot bind in one of these two.
-    return engine.dialect.name == "sqlite" and isinstance(error, refused)
+    refusals = (InterfaceError, ProgrammingError)
+    # Python's SQLite driver reports a type that it cannot bind by one of these two.
+    return engine.dialect.name == "sqlite" and isinstance(error, refusals)
 
 
 _BATCH = 500
 _GATHER_S = 0.25
-"""A batch of so long is worth its commit."""
+"""Time in which a batch gathers, so that its commit is worth the cost (s)."""
 _RETRY_S = 2.0
 _LATE_S = 2.0
+"""Longest wait of a row while the history counts as healthy (s)."""
 
 
 class Recorder:
     """The history's writing side; ``enqueue`` from the event loop's thread only.
 
     Args:
-        database_url: Brought to the newest shape before the first write.
+        database_url: Database, which is migrated before the first write.
         journal: Holds rows of orders.
-        read_clock: For the age of waiting records and the order of revisions.
+        read_clock: Clock for the age of waiting records and the order of revisions.
+
+    Attributes:
+        caught_up: Set once the database has all rows of earlier runs' journal.
     """
 
     def __init__(
@@ -188,7 +191,7 @@ class Recorder:
         self._clock = read_clock
         self._queue = RecordQueue(capacity)
         self._thread = ThreadPoolExecutor(1, "history")
-        self._awake, self._caught_up = asyncio.Event(), asyncio.Event()
+        self._awake, self.caught_up = asyncio.Event(), asyncio.Event()
         self._writing: asyncio.Task[bool] | None = None
         self._written = self._revision = 0
         self._lost_since: float | None = None
@@ -198,7 +201,7 @@ class Recorder:
     def enqueue(self, record: Record) -> None:
         """Queue a record; never blocks, never awaits, never fails."""
         now = self._clock()
-        # The wall clock orders states across restarts, the count within one run.
+        # The wall clock orders states across restarts, the count within a run.
         self._revision = max(self._revision + 1, int(now.wall * 1e9))
         waiting = Waiting(record, self._revision, now.mono)
         if is_order(record):
@@ -206,20 +209,16 @@ class Recorder:
         self._queue.enqueue(waiting)
         self._awake.set()
 
-    async def caught_up(self) -> None:
-        """Return when the database has what earlier runs left in the journal."""
-        await self._caught_up.wait()
-
-    def state(self, now: Instant) -> Literal["ok", "late", "down"]:
-        """Whether rows reach the database, at least within 2 s."""
+    def state(self) -> Literal["ok", "late", "down"]:
+        """State of the database: whether rows reach it, within 2 s or later."""
         if self._lost_since is not None:
             return "down"
-        oldest = self._queue.oldest_since()
-        return "late" if oldest is not None and now.mono - oldest > _LATE_S else "ok"
+        oldest, now = self._queue.oldest_since(), self._clock().mono
+        return "late" if oldest is not None and now - oldest > _LATE_S else "ok"
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """Rows since the start, and rows that wait now."""
+        """Rows by outcome since the start, and rows that wait now."""
         return {
             "history_written": self._written,
             "history_dropped": self._queue.dropped,
@@ -227,31 +226,29 @@ class Recorder:
             "history_waiting": len(self._queue),
         }
 
-    # --- beside it ----------------------------------------------------------------
+    # --- other writes -------------------------------------------------------------
 
     async def between_batches(self, work: Callable[[Connection], _T]) -> _T:
-        """Other work of the one writer, a transaction between two batches.
+        """Do other work in a transaction between two batches.
 
         Raises:
             HopError: the database is away.
             DataFileError: it cannot be used.
         """
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._thread, self._store.run, work)
+        return await asyncio.wrap_future(self._thread.submit(self._store.run, work))
 
     # --- the one writer -----------------------------------------------------------
 
     async def run(self) -> None:
         """Write until cancelled; call ``close`` afterwards."""
         now = self._clock().mono
-        self._queue.put_back([replace(one, since=now) for one in self._journal.left()])
+        self._queue.put_back([replace(row, since=now) for row in self._journal.left()])
         while True:
             self._awake.clear()
-            batch = self._queue.dequeue(_BATCH)
             self._writing = asyncio.create_task(
-                self._write(batch), name="history-batch"
+                self._write(self._queue.dequeue(_BATCH)), name="history-batch"
             )
-            # Cancelling us must not lose sight of a batch that the thread still writes.
+            # Shielded: `close` waits for a batch that the thread still writes.
             if not await asyncio.shield(self._writing):
                 await asyncio.sleep(_RETRY_S)
             elif not len(self._queue):
@@ -259,48 +256,46 @@ class Recorder:
                 await asyncio.sleep(_GATHER_S)
 
     async def close(self) -> None:
-        """Store the rest, and close the database; orders stay in the journal."""
+        """Store waiting rows, and close the database; orders stay in the journal."""
         if self._writing is not None:
             await asyncio.wait({self._writing})
         while len(self._queue) and self._lost_since is None:
             await self._write(self._queue.dequeue(_BATCH))
         await self.flushed()
-        rest = self._queue.dequeue(len(self._queue))
-        if lost := sum(not is_order(one.record) for one in rest):
-            self._queue.dropped += lost
-            _log.warning("history: %d rows were not stored", lost)
-        loop = asyncio.get_running_loop()
-        await loop.run_in_executor(self._thread, self._store.close)
+        waiting = self._queue.dequeue(len(self._queue))
+        if lost_rows := sum(not is_order(row.record) for row in waiting):
+            self._queue.dropped += lost_rows
+            _log.warning("history: %d rows were not stored", lost_rows)
+        await asyncio.wrap_future(self._thread.submit(self._store.close))
         self._thread.shutdown(wait=False)
 
     async def _write(self, batch: list[Waiting]) -> bool:
-        """Store a batch, or put it back; whether it is stored."""
-        loop = asyncio.get_running_loop()
+        """Store a batch, or put it back into the queue; whether it is stored."""
         try:
-            await loop.run_in_executor(self._thread, self._store.write, batch)
+            await asyncio.wrap_future(self._thread.submit(self._store.write, batch))
         except Exception as error:
-            # Whatever memory stumbles over, it must not take the STOP along.
+            # An error of the history must not end the process that a STOP needs.
             if not isinstance(error, HopError | DataFileError):
-                _log.exception("history: an error of our own")
+                _log.exception("history: an error of the program")
             if self._lost_since is None:
                 self._lost_since = self._clock().mono
                 _log.warning("history: database lost: %s", error)
             self._queue.put_back(batch)
             return False
         if self._lost_since is not None:
-            away = self._clock().mono - self._lost_since
-            _log.info("history: database is back after %.1f s", away)
+            away_s = self._clock().mono - self._lost_since
+            _log.info("history: database is back after %.1f s", away_s)
             self._lost_since = None
         self._written += len(batch)
-        if orders := {one.revision for one in batch if is_order(one.record)}:
+        if orders := {row.revision for row in batch if is_order(row.record)}:
             await self._journal.committed(orders)
         if not self._journal.left():
-            self._caught_up.set()
+            self.caught_up.set()
         return True
 
 
 def spilled_file(database_url: str, directory: Path) -> Path:
-    """Rows that an earlier version kept for its database while that was away.
+    """File of rows that an earlier version kept while its database was away.
 
     Raises:
         SettingsError: the address cannot be used.

@@ -1,6 +1,6 @@
 """Series and counts for charts and the evening sheet, thinned in the database.
 
-A short range is answered row by row; a longer one in equal slices of time, each with
+A short range is read row by row, a longer one in equal slices of time.  A slice has
 its mean speed and its strictest factor, so that a short slow-down is never lost.
 """
 
@@ -18,18 +18,15 @@ from iveg.adapters.history.tables import (
     odometry,
 )
 from iveg.domain.day import DaySighting, Pose
+from iveg.vital.event_log import READING_PERIOD_S
 from iveg.vital.record import ODOMETRY_PERIOD_S
 
 
 def whole(connection: Connection, value: ColumnElement[Any]) -> ColumnElement[int]:
-    """Rounded down: a cast does that on SQLite, and rounds to nearest on PostgreSQL."""
+    """Round down: a cast does so on SQLite, and rounds to nearest on PostgreSQL."""
     if connection.dialect.name == "sqlite":
         return cast(value, Integer)
     return cast(func.floor(value), Integer)
-
-
-READING_PERIOD_S = 60.0
-"""Between two kept readings (``vital.event_log``)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +34,10 @@ class Charted:
     """Columns of a table that are drawn over time.
 
     Attributes:
-        keys: Columns that tell one line from another.
-        values: Drawn column → function that makes one value of a slice.
-        most: Slices of a range.
-        period_s: Between two rows of a line; a shorter slice would hold one at most.
+        keys: Columns that tell lines apart.
+        values: Drawn column → function that reduces a slice to a value.
+        most: Slices of a range at most.
+        period_s: Time between two rows of a line (s): shorter slices reduce nothing.
     """
 
     table: Table
@@ -57,6 +54,7 @@ SPEEDS = Charted(
     2000,
     ODOMETRY_PERIOD_S,
 )
+# 288 slices: five minutes each over a day.
 AIR = Charted(
     climate,
     (),
@@ -78,8 +76,8 @@ class Series:
     """One line over a range.
 
     Attributes:
-        at: Unix seconds, rising.
-        values: Drawn column → its values, as many; None where it was silent.
+        at: Times of the points (Unix s), rising.
+        values: Drawn column → a value for each point; None where it was silent.
         slice_s: Length of a slice (s); 0 where each point is one row.
     """
 
@@ -95,18 +93,18 @@ def series_of(
     until: float,
     robot: str | None = None,
 ) -> dict[tuple[str, ...], Series]:
-    """The lines with data in ``since <= at < until``, by their keys."""
+    """Lines with data in ``since <= at < until`` (Unix s), by their keys."""
     c = charted.table.c
     slice_s = (until - since) / charted.most
     if slice_s <= charted.period_s:
         slice_s = 0.0
-    place = whole(connection, (c.at - since) / slice_s) if slice_s else c.row_id
+    group = whole(connection, (c.at - since) / slice_s) if slice_s else c.row_id
     keys = [c[name] for name in charted.keys]
     values = [reduced(c[name]) for name, reduced in charted.values.items()]
     statement = (
         select(*keys, func.min(c.at), *values)
         .where(c.at >= since, c.at < until)
-        .group_by(*keys, place)
+        .group_by(*keys, group)
         .order_by(func.min(c.at))
     )
     if robot is not None:
@@ -114,20 +112,20 @@ def series_of(
     lines: dict[tuple[str, ...], list[tuple[Any, ...]]] = defaultdict(list)
     for row in connection.execute(statement):
         lines[tuple(row[: len(keys)])].append(tuple(row[len(keys) :]))
-    found = {}
+    series = {}
     for key, rows in lines.items():
         at, *columns = zip(*rows, strict=True)
-        found[key] = Series(
+        series[key] = Series(
             at, dict(zip(charted.values, columns, strict=True)), slice_s
         )
-    return found
+    return series
 
 
 def poses_of(connection: Connection, since: float, until: float) -> tuple[Pose, ...]:
-    """Poses of robots in each second of ``since <= at < until``, in order."""
+    """Mean pose of each robot in each second of ``since <= at < until``, in order."""
     c = odometry.c
     second = whole(connection, c.at)
-    wanted = (
+    statement = (
         select(
             c.robot_id,
             second,
@@ -139,22 +137,22 @@ def poses_of(connection: Connection, since: float, until: float) -> tuple[Pose, 
         .group_by(c.robot_id, second)
         .order_by(second)
     )
-    return tuple(Pose(*row) for row in connection.execute(wanted))
+    return tuple(Pose(*row) for row in connection.execute(statement))
 
 
 def people_seen(
     connection: Connection, since: float, until: float
 ) -> tuple[DaySighting, ...]:
-    """Positions of confirmed people in each second of ``since <= at < until``."""
+    """Mean position of each confirmed person in each second of that range."""
     c = detections.c
     second = whole(connection, c.at)
-    wanted = (
+    statement = (
         select(second, func.avg(c.x), func.avg(c.y))
         .where(c.at >= since, c.at < until, c.confident, c.class_ == "person")
-        # A place that is no longer kept is no place near a robot.
+        # A position that was deleted by retention is near no robot.
         .where(c.x.is_not(None))
-        # Two people of one second must not become one between them.
+        # The mean of two people would be a place where nobody was.
         .group_by(c.robot_id, c.person_id, second)
         .order_by(second)
     )
-    return tuple(DaySighting(*row) for row in connection.execute(wanted))
+    return tuple(DaySighting(*row) for row in connection.execute(statement))

@@ -1,13 +1,13 @@
-"""The history as tables, the same on SQLite and PostgreSQL.
+"""Tables of the history, the same on SQLite and PostgreSQL.
 
 The columns of a table are those of its record (``domain.records``); keys, indexes and
-the order of rows stand here.  Facts have a number that only grows; ``(robot_id, at)``
-answers "what did this robot do then", which time travel, retention and charts all ask.
-``revision`` lets the newest state of a decision, command or alert win in whatever order
-states arrive.
+the order of rows stand here.  Facts have a number that only grows.  The index
+``(robot_id, at)`` serves time travel, retention and charts.  By ``revision`` the newest
+state of a decision, command or alert wins, in whatever order states arrive.
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, get_origin
 
@@ -54,13 +54,13 @@ from iveg.domain.records import (
 
 
 class JsonValue(TypeDecorator[Any]):
-    """JSON as PostgreSQL keeps it (JSONB); in SQLite, whose JSON is text, its text.
+    """JSON: JSONB in PostgreSQL, text in SQLite.
 
-    What is damaged, or JSON of another shape, reads as null: one bad row must not hide
-    a list.
+    Damaged JSON, or JSON of another shape, reads as null: a bad row must not hide a
+    list.
 
     Attributes:
-        shape: ``dict`` or ``list``, of what is kept.
+        shape: Type of the value, ``dict`` or ``list``.
     """
 
     impl = JSON
@@ -73,26 +73,20 @@ class JsonValue(TypeDecorator[Any]):
         self.shape = shape
 
     def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
-        """Type that the database knows."""
+        """Type of the column in the database."""
         kind: TypeEngine[Any] = Text() if dialect.name == "sqlite" else JSONB()
         return dialect.type_descriptor(kind)
 
     def process_bind_param(self, value: object, dialect: Dialect) -> object:
-        """A value on its way in."""
+        """Convert a value for the database."""
         return orjson.dumps(value).decode() if dialect.name == "sqlite" else value
 
     def process_result_value(self, value: Any, dialect: Dialect) -> object:
-        """A value on its way out."""
-        if dialect.name == "sqlite" and value is not None:
-            value = _loaded(value)
+        """Convert a value of the database."""
+        with suppress(orjson.JSONDecodeError):
+            if dialect.name == "sqlite" and value is not None:
+                value = orjson.loads(value)
         return value if isinstance(value, self.shape) else None
-
-
-def _loaded(text: str) -> object:
-    try:
-        return orjson.loads(text)
-    except orjson.JSONDecodeError:
-        return None
 
 
 metadata = MetaData(
@@ -119,9 +113,9 @@ class TableMapping:
 
     Attributes:
         identity: Columns that name the thing or fact; empty where every row is new.
-        changes: Whether a later record takes the place of an earlier one.
-        at: The time of a row, by which rows stand in lists and age.
-        key: Tells rows of one time from each other.
+        changes: Whether a later record replaces an earlier one.
+        at: Time of a row (Unix s), which orders lists and decides its age.
+        key: Order of rows with the same time.
     """
 
     table: Table
@@ -142,41 +136,41 @@ def _table(
     at: str = "at",
     key: str = "row_id",
 ) -> Table:
-    """The table of a kind of record, which is registered.
+    """Make and register the table of a kind of record.
 
     Args:
-        name: Of the table.
-        kind: The record that has its columns.
+        name: Name of the table.
+        kind: Record with its columns.
         beside: Its indexes, and columns that only earlier versions filled.
         identity: See ``TableMapping``.
         at: See ``TableMapping``.
-        key: Its primary key: a column of the record, of which a later row takes the
-            place of an earlier one, or else a number.
+        key: Primary key: a column of the record, by which a later row replaces an
+            earlier one, or else a number.
     """
-    columns = [_column(one, key, identity) for one in COLUMNS[kind]]
-    changes = key in {one.key for one in columns}
+    columns = [_column(column, key, identity) for column in COLUMNS[kind]]
+    changes = key in {column.key for column in columns}
     if changes:
         columns.append(Column("revision", BigInteger, nullable=False))
     else:
         columns.insert(0, Column(key, _BIG, primary_key=True, autoincrement=True))
+    # A number is never used again: a cursor would point at another row.
     is_counted = key == "row_id"
     table = Table(name, metadata, *columns, *beside, sqlite_autoincrement=is_counted)
-    found = table.c[at], table.c[key]
-    TABLE_MAPPINGS[kind] = TableMapping(table, tuple(identity), changes, *found)
+    order = table.c[at], table.c[key]
+    TABLE_MAPPINGS[kind] = TableMapping(table, tuple(identity), changes, *order)
     return table
 
 
-def _column(one: records.Column, key: str, identity: Sequence[str]) -> Column[Any]:
+def _column(row: records.Column, key: str, identity: Sequence[str]) -> Column[Any]:
     type_: TypeEngine[Any] | type[TypeEngine[Any]]
-    if one.type == "json":
-        type_ = JsonValue(list if get_origin(one.hint) is Sequence else dict)
-    elif one.type == "integer" and one.key in identity:
+    if row.type == "json":
+        type_ = JsonValue(list if get_origin(row.hint) is Sequence else dict)
+    elif row.type == "integer" and row.key in identity:
         type_ = BigInteger
     else:
-        type_ = _TYPES[one.type]
-    is_key = one.key == key
+        type_ = _TYPES[row.type]
     return Column(
-        one.name, type_, key=one.key, nullable=one.may_lack, primary_key=is_key
+        row.name, type_, key=row.key, nullable=row.may_lack, primary_key=row.key == key
     )
 
 
@@ -204,6 +198,7 @@ commands = _table(
     at="requested_at",
     key="command_id",
 )
+# Unique: a step may come twice, from the queue and from the journal after a restart.
 command_events = _table(
     "command_events",
     CommandEventRecord,
@@ -230,8 +225,8 @@ log = _table(
     identity=["id", "at"],
 )
 _CHARTED = ["linear", "limit_factor", "applied_factor", "margin_m"]
-"""A chart of a robot's day reads them from the index: each page of the table holds a
-few of its rows."""
+"""Columns in the index, from which a chart of a robot's day reads them: a page of the
+table holds only a few of its rows."""
 odometry = _table(
     "odometry",
     OdometryRecord,
@@ -260,13 +255,13 @@ audit = _table(
     identity=["audit_id"],
     key="seq",
 )
-"""Triggers of its migrations refuse changes and deletions (``upkeep``)."""
+"""Triggers in its migrations refuse changes and deletions (``upkeep``)."""
 
 
 def _placed(table: Table, at: str, sqlite: str, postgresql: str) -> Index:
-    """Index of the rows that have a place still, by which they are found to lose it.
+    """Index of rows that still have a position, by which retention finds them.
 
-    A query finds it by its condition, word for word.
+    A database uses it for queries with the same condition, word for word.
     """
     return Index(
         f"ix_{table.name}_placed",
@@ -284,9 +279,9 @@ PLACED = {
 
 
 EARLIER = "accounts", "api_tokens", "access_moved"
-"""Tables of earlier versions, whose rows are copied once; they go later."""
+"""Tables of earlier versions, whose rows are copied once."""
 AGES: dict[str, Column[Any]] = {
-    one.table.name: one.at for one in TABLE_MAPPINGS.values()
+    mapping.table.name: mapping.at for mapping in TABLE_MAPPINGS.values()
 }
 """Table → the column by which its rows age (Unix s)."""
 
@@ -304,4 +299,4 @@ OPEN: Mapping[Table, ColumnElement[bool]] = {
     commands: _is_open_command(),
     alerts: alerts.c.cleared_at.is_(None),
 }
-"""Condition of a table's rows whose thing goes on, by their last state."""
+"""Condition of open rows in a table, by their last state."""

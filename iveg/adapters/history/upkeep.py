@@ -1,7 +1,7 @@
-"""Upkeep of the history: rows whose time is over go, in pieces of one transaction each.
+"""Upkeep of the history: deletes old rows, in pieces of a transaction each.
 
-Once a minute the disk is looked at, too: where it is low, people are told, and the
-oldest recordings of inputs go before their time.
+Once a minute the disk is checked, too.  Where it is low, an alert is raised, and the
+oldest recordings of inputs are deleted early.
 """
 
 import asyncio
@@ -10,37 +10,31 @@ from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from sqlalchemy import (
-    ColumnElement,
     Connection,
     Table,
     TextClause,
     and_,
     delete,
-    exists,
     func,
     null,
-    or_,
     select,
     text,
     true,
     update,
 )
 
-from iveg.adapters.files import disk_space
+from iveg.adapters.files import disk_errors, disk_space
 from iveg.adapters.history import tables
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder
 from iveg.adapters.history.tables import (
     AGES,
     OPEN,
-    decisions,
-    detections,
     log,
     metadata,
-    odometry,
 )
 from iveg.domain.audit import ITSELF
 from iveg.domain.errors import HopError
@@ -53,38 +47,39 @@ from iveg.vital.ports import Clock
 from iveg.vital.supervision import Supervision
 
 PIECE = 10_000
-"""Rows of one transaction; more where many are of one moment."""
+"""Rows of a transaction; more where many rows have the same time."""
 
 _GUARD = "audit_no_delete"
 
 
 def purge_piece(connection: Connection, step: PurgeStep, before: float) -> int:
-    """Take the oldest rows of a step, within the transaction of the caller.
+    """Purge the oldest rows of a step, within the caller's transaction.
 
     Args:
-        connection: Of the one writer.
-        step: What goes.
-        before: Rows that are older than this (Unix s).
+        connection: Connection of the one writer.
+        step: Table, and what it loses: rows or positions.
+        before: Upper bound of the rows' time (Unix s).
 
     Returns:
-        Number of rows that it changed; fewer than a piece: nothing is left to do.
+        Number of changed rows; fewer than a piece: nothing is left to do.
     """
     table, at = metadata.tables[step.table], AGES[step.table]
     dialect = connection.dialect.name
-    # What goes on is kept whatever its age.
-    which = ~OPEN[table] if table in OPEN else true()
+    # Open rows are kept at any age.
+    condition = ~OPEN[table] if table in OPEN else true()
     if step.kind == "positions":
-        which = tables.PLACED[step.table].dialect_options[dialect]["where"]
-    due = and_(at < before, which)
-    last = select(at).where(due).order_by(at).offset(PIECE - 1).limit(1)
+        condition = tables.PLACED[step.table].dialect_options[dialect]["where"]
+    is_old = and_(at < before, condition)
+    last = select(at).where(is_old).order_by(at).offset(PIECE - 1).limit(1)
     until = connection.scalar(last)
+    # By time: a DELETE has no limit of rows.
     if until is not None:
-        due = and_(at <= until, which)
+        is_old = and_(at <= until, condition)
     if step.kind == "positions":
-        change = update(table).where(due).values(_without_place(table, dialect))
+        change = update(table).where(is_old).values(_without_place(table, dialect))
         return connection.execute(change).rowcount
     with _deletable(connection, table):
-        return connection.execute(delete(table).where(due)).rowcount
+        return connection.execute(delete(table).where(is_old)).rowcount
 
 
 @contextmanager
@@ -115,49 +110,28 @@ def _without_place(table: Table, dialect: str) -> dict[str, Any]:
 
 
 def _pruned(column: str, members: tuple[str, ...], dialect: str) -> TextClause:
-    """An object without some members; a damaged one, which reads as none, is empty."""
+    """SQL of an object without some members; a damaged object becomes empty."""
     if dialect == "sqlite":
-        paths = ", ".join(f"'$.{one}'" for one in members)
+        paths = ", ".join(f"'$.{name}'" for name in members)
         pruned, is_object = f"json_remove({column}, {paths})", f"json_valid({column})"
     else:
-        pruned = " - ".join((column, *(f"'{one}'" for one in members)))
+        pruned = " - ".join((column, *(f"'{name}'" for name in members)))
         is_object = f"jsonb_typeof({column}) = 'object'"
     return text(f"CASE WHEN {is_object} THEN {pruned} ELSE '{{}}' END")
 
 
-def lost_of(
-    connection: Connection, since: float, until: float
-) -> tuple[Literal["places", "telemetry"], ...]:
-    """Kinds of rows no longer kept of ``since <= at < until``, or of a part of it."""
-    d, s = detections.c, decisions.c
-    decided = and_(s.started_at >= since, s.started_at < until)
-    # A decision was about somebody, and its robot drove.
-    unplaced = or_(
-        exists().where(decided, s.x.is_(None)),
-        exists().where(d.at >= since, d.at < until, d.x.is_(None)),
-    )
-    oldest = select(func.min(odometry.c.at)).scalar_subquery()
-    undriven = or_(oldest >= until, exists().where(decided, s.started_at < oldest))
-    lost: Mapping[Literal["places", "telemetry"], ColumnElement[bool]] = {
-        "places": unplaced,
-        "telemetry": undriven,
-    }
-    return tuple(
-        kind for kind, is_lost in lost.items() if connection.scalar(select(is_lost))
-    )
-
-
 def recorded_days(connection: Connection, most: int) -> tuple[int, ...]:
-    """Days (UTC, since 1970) with a line in the log, newest first, by hops."""
+    """Days (UTC, since 1970) with a line in the log, newest first."""
     days: list[int] = []
     newest = select(func.max(log.c.at))
+    # A query for each day hops over the index; a single query would read all rows.
     while len(days) < most:
         if days:
             newest = select(func.max(log.c.at)).where(log.c.at < days[-1] * DAY_S)
-        found = connection.scalar(newest)
-        if found is None:
+        at = connection.scalar(newest)
+        if at is None:
             break
-        days.append(int(found // DAY_S))
+        days.append(int(at // DAY_S))
     return tuple(days)
 
 
@@ -166,58 +140,59 @@ def recorded_days(connection: Connection, most: int) -> tuple[int, ...]:
 PART = "retention"
 LOOK_S = 60.0
 SETTLES_S = 300.0
-"""A server that has just started has other things to do."""
+"""Time after the start without a purge (s): a start is busy enough."""
 PAUSE_S = 0.1
-"""Between two pieces: rows that wait to be written come in between."""
+"""Pause between two pieces (s), in which waiting rows are written."""
 
 
 class DiskWatch:
-    """Tells people of a disk that is low, and has the oldest recordings go.
+    """Raises alerts of a short disk; has the oldest recordings of a low disk deleted.
 
     Args:
-        directory: Of the data, whose disk is watched.
+        directory: Data directory, whose disk is watched.
         drop_recording: Deletes the oldest recording of inputs, if there is one.
-        supervision: Told of a disk that is low.
-        read_space: Room on the disk of a directory.
+        is_paused: Whether recordings pause, as the disk is short.
+        supervision: Raises the alert.
+        read_space: Space on the disk of a directory.
     """
 
     def __init__(
         self,
         directory: Path,
         drop_recording: Callable[[], Awaitable[bool]],
+        is_paused: Callable[[], bool],
         supervision: Supervision,
         read_space: Callable[[Path], DiskSpace] = disk_space,
     ) -> None:
         self.deleted = 0
-        """Recordings since the start."""
-        self._directory = directory
-        self._drop_recording = drop_recording
+        """Recordings deleted since the start."""
+        self._directory, self._read_space = directory, read_space
+        self._drop_recording, self._is_paused = drop_recording, is_paused
         self._supervision = supervision
-        self._read_space = read_space
         self._is_low = False
 
     async def look(self) -> None:
-        """Look at the disk.  Raises HopError: it cannot be read."""
-        try:
+        """Check the disk.  Raises HopError: it cannot be read."""
+        with disk_errors():
             space = await asyncio.to_thread(self._read_space, self._directory)
-        except OSError as error:
-            raise HopError("disk", error.strerror or str(error)) from error
-        self._supervision.report(PART, space.conditions(was_low=self._is_low))
-        self._is_low = space.is_low(was_low=self._is_low)
-        if self._is_low and await self._drop_recording():
+        self._is_low = is_low = space.is_low(was_low=self._is_low)
+        self._supervision.report(
+            PART, space.conditions(is_low=is_low, is_paused=self._is_paused())
+        )
+        if is_low and await self._drop_recording():
             self.deleted += 1
 
 
 class HistoryUpkeep:
-    """Has rows leave the history when their time is over, once a day (UTC).
+    """Deletes rows whose retention is over, once a day (UTC).
 
     Args:
-        recorder: The one writer.
-        queries: Its reading side.
-        retention: Days that each kind of row is kept.
-        event_log: Gets a line a day.
-        trail: Told what was deleted.
-        disk: Looked at once a minute.
+        recorder: Writes to the history.
+        queries: Reads the history.
+        retention: Days for which each kind of row is kept.
+        event_log: Gets a line each day.
+        trail: Audit of the deletions.
+        disk: Checked once a minute.
     """
 
     def __init__(
@@ -229,12 +204,9 @@ class HistoryUpkeep:
         trail: AuditTrail,
         disk: DiskWatch,
     ) -> None:
-        self._recorder = recorder
-        self._queries = queries
-        self._retention = retention
-        self._event_log = event_log
-        self._trail = trail
-        self._disk = disk
+        self._recorder, self._queries = recorder, queries
+        self._retention, self._disk = retention, disk
+        self._event_log, self._trail = event_log, trail
         self._rows: Counter[str] = Counter()
         self._settled_at: float | None = None
         self._purged_day: int | None = None
@@ -242,26 +214,26 @@ class HistoryUpkeep:
     @property
     def counters(self) -> Mapping[str, int]:
         """Rows deleted and unplaced, and recordings deleted, since the start."""
-        rows = {f"history_{done}": count for done, count in self._rows.items()}
+        rows = {f"history_{outcome}": count for outcome, count in self._rows.items()}
         return rows | {"recordings_deleted": self._disk.deleted}
 
     async def run(self, clock: Clock) -> None:
-        """Until cancelled."""
+        """Check disk and history once a minute until cancelled."""
         while True:
-            # A database that is away is the recorder's to report.
+            # The recorder reports a database that is away.
             with suppress(HopError):
                 await self._disk.look()
                 await self.look(clock())
             await asyncio.sleep(LOOK_S)
 
     async def look(self, now: Instant) -> None:
-        """Purge where that is due.  Raises HopError: the database is away."""
+        """Purge where it is due.  Raises HopError: the database is away."""
         if self._settled_at is None:
             self._settled_at = now.mono + SETTLES_S
         day = int(now.wall // DAY_S)
         if now.mono >= self._settled_at and day != self._purged_day:
             await self._purge(now)
-            # Where the database fails before, the day is taken up at the next look.
+            # After the purge: after a failure the next attempt comes in a minute.
             self._purged_day = day
 
     async def _purge(self, now: Instant) -> None:
@@ -272,17 +244,17 @@ class HistoryUpkeep:
             if step.kind not in cutoffs:
                 continue
             before = cutoffs[step.kind]
-            done = "unplaced" if step.kind == "positions" else "deleted"
+            outcome = "unplaced" if step.kind == "positions" else "deleted"
             if rows := await self._take(step, before):
-                slots[done] += rows
+                slots[outcome] += rows
                 details = {"rows": rows, "before": before}
-                self._trail.note(ITSELF, done, step.table, details, at=now)
+                self._trail.note(ITSELF, outcome, step.table, details, at=now)
         self._rows.update(slots)
-        # By this line a day is recorded also where nothing else happens.
+        # By this line a day counts as recorded, even if nothing else happens in it.
         self._event_log.log(LogEvent("system", "log.history_kept", slots), now)
 
     async def _take(self, step: PurgeStep, before: float) -> int:
-        """All rows of a step, a piece after the other; their number."""
+        """Purge all rows of a step, piece by piece; returns their number."""
         rows = 0
         piece = partial(purge_piece, step=step, before=before)
         while took := await self._recorder.between_batches(piece):

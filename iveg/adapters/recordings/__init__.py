@@ -1,1 +1,1 @@
-"""Recordings of what came in, as MCAP (docs/interfaces/recordings.md)."""
+"""Recordings of inputs, as MCAP (docs/interfaces/recordings.md)."""

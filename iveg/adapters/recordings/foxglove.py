@@ -1,4 +1,4 @@
-"""Messages for viewers such as Foxglove, made of observations, thinned.
+"""Messages for viewers such as Foxglove, made from observations at a lower rate.
 
 ``foxglove.json`` has the schemas (https://docs.foxglove.dev/docs/sdk/schemas).  Frames
 are ``map`` and ``{robot}/base_link``.
@@ -6,6 +6,7 @@ are ``map`` and ``{robot}/base_link``.
 
 import math
 from collections.abc import Iterator, Mapping
+from functools import cache
 from importlib.resources import files
 from typing import Any, Final
 
@@ -27,24 +28,25 @@ from iveg.domain.observations import (
 _SCHEMAS: Final = orjson.loads((files(__package__) / "foxglove.json").read_bytes())
 _MAP, _BASE = "map", "base_link"
 _SHOWN_S: Final = 1.0
-"""Time that a box is drawn; the next picture takes its place before that."""
+"""Time for which a box is drawn (s); the next frame replaces it before."""
 DRAWN_APART_S: Final[Mapping[type[Observation], float]] = {
     Odometry: 0.1,
     LaserScan: 0.2,
     DetectionFrame: 0.2,
 }
-"""Kinds that viewers draw, and the least time between two of a robot (s)."""
+"""Kinds that viewers draw, and the least time between two messages of a robot (s)."""
+# A message that jitter brings a little early still counts as due.
 _EARLY: Final = 0.95
 
 
 class Drawing:
-    """Draws observations as they come, of either transport."""
+    """Converts observations of both transports as they arrive."""
 
     def __init__(self) -> None:
         self._due: dict[tuple[str, type[Observation]], float] = {}
 
     def messages(self, received: Received) -> Iterator[tuple[Channel, bytes]]:
-        """Messages of an observation that is due."""
+        """Messages of an observation, if its kind is due."""
         observation, now = received.observation, received.at
         stream = observation.robot_id, kind_of(observation)
         apart_s = DRAWN_APART_S.get(stream[1])
@@ -58,7 +60,7 @@ class Drawing:
 def _drawn(
     observation: Observation, wall: float
 ) -> Iterator[tuple[Channel, Mapping[str, Any]]]:
-    """Messages of an observation that came at ``wall`` (Unix s)."""
+    """Messages of an observation that arrived at ``wall`` (Unix s)."""
     at, robot_id = _time(wall), observation.robot_id
     base = f"{robot_id}/{_BASE}"
     match observation:
@@ -79,41 +81,46 @@ def _drawn(
                 },
             )
         case LaserScan(angle_min=first, angle_increment=step, ranges=ranges):
-            message = {
-                "timestamp": at,
-                "frame_id": base,
-                "pose": _as_pose(observation.mount),
-                "start_angle": first,
-                "end_angle": first + step * max(0, ranges.size - 1),
-                "ranges": np.round(ranges, 3),
-                "intensities": [],
-            }
-            yield _channel(f"/{robot_id}/scan", "LaserScan"), message
+            yield (
+                _channel(f"/{robot_id}/scan", "LaserScan"),
+                {
+                    "timestamp": at,
+                    "frame_id": base,
+                    "pose": _as_pose(observation.mount),
+                    "start_angle": first,
+                    "end_angle": first + step * max(0, ranges.size - 1),
+                    "ranges": np.round(ranges, 3),
+                    "intensities": [],
+                },
+            )
         case DetectionFrame(detections=detections):
             entities = [
-                {"timestamp": at, "id": f"{robot_id}-{number}", **_entity(one, base)}
-                for number, one in enumerate(detections)
+                {"timestamp": at, "id": f"{robot_id}-{i}", **_entity(detection, base)}
+                for i, detection in enumerate(detections)
             ]
-            message = {"deletions": [], "entities": entities}
-            yield _channel(f"/{robot_id}/detections", "SceneUpdate"), message
+            yield (
+                _channel(f"/{robot_id}/detections", "SceneUpdate"),
+                {"deletions": [], "entities": entities},
+            )
 
 
+@cache
 def _channel(topic: str, schema: str) -> Channel:
     name = f"foxglove.{schema}"
     return Channel(topic, name, orjson.dumps(_SCHEMAS[name]))
 
 
-def _entity(seen: Detection, base: str) -> Mapping[str, Any]:
-    box = seen.box
+def _entity(detection: Detection, base: str) -> Mapping[str, Any]:
+    box = detection.box
     size = box.xmax - box.xmin, box.ymax - box.ymin, box.zmax - box.zmin
     cube = {
         "pose": {"position": _vector(*box.centre), "orientation": _turn(0.0)},
         "size": _vector(*size),
-        "color": {"r": 1.0, "g": 0.6, "b": 0.0, "a": seen.probability},
+        "color": {"r": 1.0, "g": 0.6, "b": 0.0, "a": detection.probability},
     }
-    facts = {"class": seen.class_id, "confidence": f"{seen.probability:.3f}"}
+    facts = {"class": detection.class_id, "confidence": f"{detection.probability:.3f}"}
     return {
-        "frame_id": _MAP if seen.frame_id == _MAP else base,
+        "frame_id": _MAP if detection.frame_id == _MAP else base,
         "lifetime": _time(_SHOWN_S),
         "frame_locked": True,
         "metadata": [{"key": key, "value": value} for key, value in facts.items()],
@@ -122,8 +129,7 @@ def _entity(seen: Detection, base: str) -> Mapping[str, Any]:
 
 
 def _time(seconds: float) -> Mapping[str, int]:
-    whole = math.floor(seconds)
-    return {"sec": whole, "nsec": int((seconds - whole) * 1e9)}
+    return {"sec": math.floor(seconds), "nsec": int(seconds % 1 * 1e9)}
 
 
 def _as_pose(pose: Pose2D) -> Mapping[str, Any]:

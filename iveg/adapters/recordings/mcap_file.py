@@ -1,6 +1,6 @@
-"""MCAP files (https://mcap.dev/spec), compressed in chunks with an index: both ways.
+"""Writing and reading of MCAP files (https://mcap.dev/spec): compressed, with an index.
 
-Read back are whole files, parts, and what a crash left.
+Reading takes whole files, parts, and files that a crash left.
 """
 
 import contextlib
@@ -18,24 +18,24 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from iveg import __version__
+from iveg.adapters.files import disk_errors
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.observations import Instant
 
 _log = logging.getLogger(__name__)
 PROFILE: Final = "iveg"
 CHUNK_BYTES: Final = 1 << 22
-"""Of what is not compressed yet; a chunk ends when it has more.  The index is in memory
-until the end of a file: of ten robots it grows by 4 MB in five minutes, and by 9 MB
-with chunks of 1 MB."""
+"""Size of a chunk before compression (bytes).  The index is in memory until the end of
+a file: for ten robots it grows by 4 MB in five minutes, with chunks of 1 MB by 9 MB."""
 _PADDING: Final = "/iveg/padding"
-"""Topic of zeros by which earlier versions ended a chunk."""
+"""Topic of zeros with which earlier versions ended a chunk."""
 _NS: Final = 10**9
 FOREVER: Final = 9e9
 """Later than every moment of a recording (Unix s)."""
 
 
 class Channel(NamedTuple):
-    """A topic of a recording, with the name and JSON Schema of its messages."""
+    """Topic of a recording, with the name and JSON Schema of its messages."""
 
     topic: str
     schema: str
@@ -53,14 +53,14 @@ class McapFile:
     """A recording that is being written; for one thread at a time.
 
     A message's ``log_time`` is the wall clock at the beginning plus the monotonic time
-    since then, so that a clock that is set neither reorders nor stretches it.
+    since then, so that setting the clock neither reorders nor stretches the file.
 
     Args:
-        path: Must not exist.
+        path: Path of the file, which must not exist.
         start: Its beginning, on both clocks.
 
     Raises:
-        OSError: it cannot be made.  So may every method.
+        OSError: it cannot be made.  Every method may raise it, too.
     """
 
     def __init__(self, path: Path, start: Instant) -> None:
@@ -71,25 +71,30 @@ class McapFile:
             self._stream, CHUNK_BYTES, CompressionType.ZSTD, enable_data_crcs=False
         )
         self._writer.start(PROFILE, f"iveg {__version__}")
-        began = {"wall": repr(start.wall), "mono": repr(start.mono)}
-        self._writer.add_metadata(PROFILE, {"version": __version__, **began})
-        self._channels: dict[str, int] = {}
-        self._schemas: dict[str, int] = {}
+        self._writer.add_metadata(
+            PROFILE,
+            {
+                "version": __version__,
+                "wall": repr(start.wall),
+                "mono": repr(start.mono),
+            },
+        )
+        self._channels, self._schemas = dict[str, int](), dict[str, int]()
 
     def add(self, channel: Channel, at: Instant, payload: bytes) -> None:
         """Append a message of JSON."""
-        log_time = self._start_ns + round((at.mono - self.start.mono) * _NS)
-        self.add_at(channel, log_time, payload)
+        since_start_ns = round((at.mono - self.start.mono) * _NS)
+        self.add_at(channel, self._start_ns + since_start_ns, payload)
 
     def add_at(self, channel: Channel, log_time: int, payload: bytes) -> None:
-        """Append a message at a time of this file's own (ns)."""
+        """Append a message at a ``log_time`` of this file (ns)."""
         number = self._channels.get(channel.topic)
         if number is None:
-            number = self._register(channel)
+            number = self._channels[channel.topic] = self._register(channel)
         self._writer.add_message(number, log_time, payload, log_time)
 
     def flush(self) -> None:
-        """Have everything so far survive the process."""
+        """Write everything so far, so that it survives the process."""
         self._writer.flush()
 
     def finish(self) -> None:
@@ -101,19 +106,16 @@ class McapFile:
 
     def _register(self, channel: Channel) -> int:
         topic, name, shape = channel
-        schema = self._schemas.get(name)
-        if schema is None:
+        if name not in self._schemas:
             schema = self._writer.register_schema(name, "jsonschema", shape)
             self._schemas[name] = schema
-        number = self._writer.register_channel(topic, "json", schema)
-        self._channels[topic] = number
-        return number
+        return self._writer.register_channel(topic, "json", self._schemas[name])
 
 
 # --- reading ----------------------------------------------------------------------
 
 _LONGEST_RECORD, _LARGEST_CHUNK = 1 << 28, 1 << 26
-"""Size that is read (bytes), on the disk and unpacked."""
+"""Limits of what is read (bytes), on the disk and unpacked."""
 
 _BROKEN = (
     McapError,
@@ -127,12 +129,13 @@ _BROKEN = (
 
 
 def is_own(path: Path) -> bool:
-    """Whether a file is a recording of iVeg's, and not another program's MCAP."""
-    try:
-        with path.open("rb") as stream:
-            return make_reader(stream).get_header().profile == PROFILE
-    except (OSError, StopIteration, *_BROKEN):
-        return False
+    """Whether iVeg recorded a file, and not another program that writes MCAP."""
+    with (
+        contextlib.suppress(OSError, StopIteration, *_BROKEN),
+        path.open("rb") as stream,
+    ):
+        return make_reader(stream).get_header().profile == PROFILE
+    return False
 
 
 def read_messages(
@@ -141,28 +144,30 @@ def read_messages(
     """Messages of a recording between two moments (Unix s), oldest first.
 
     Raises:
-        DataFileError: behind the last that can be read, where the file breaks off.
+        DataFileError: after the last readable message, where the file breaks off.
         OSError: the disk refuses.
     """
     with path.open("rb") as stream:
         try:
             reader = _reader(stream)
-            found = reader.iter_messages(
-                # Only by an index can it be done without holding all of the file.
+            for schema, channel, message in reader.iter_messages(
+                # Without an index, sorting would hold the whole file in memory.
                 log_time_order=not isinstance(reader, NonSeekingReader),
                 starting_at=round(since * _NS),
                 ending_before=round(until * _NS),
-            )
-            for schema, channel, message in found:
+            ):
                 if schema is not None and channel.topic != _PADDING:
-                    name = Channel(channel.topic, schema.name, schema.data)
-                    yield name, message.log_time, message.data
+                    yield (
+                        Channel(channel.topic, schema.name, schema.data),
+                        message.log_time,
+                        message.data,
+                    )
         except _BROKEN as error:
             raise DataFileError(str(path), "", f"breaks off: {error}.") from error
 
 
 def _reader(stream: IO[bytes]) -> McapReader:
-    """Reader by the index; without one, such as in an open file, from the beginning."""
+    """Reader by the index; an open file has none and is read from the beginning."""
     _refuse_bombs(stream)
     try:
         reader = make_reader(stream, validate_crcs=True)
@@ -174,49 +179,51 @@ def _reader(stream: IO[bytes]) -> McapReader:
 
 
 def _refuse_bombs(stream: IO[bytes]) -> None:
-    """Check all chunks before one is unpacked: a few bytes can claim to be gigabytes.
+    """Check the size of all chunks before any is unpacked.
+
+    A few bytes can claim to be gigabytes.  A damaged chunk ends only the reading.
 
     Raises:
-        ValueError: a chunk is too large.
+        ValueError: a chunk is too large, or may be.
     """
     with contextlib.suppress(McapError, struct.error):
         for record in StreamReader(
             stream, emit_chunks=True, record_size_limit=_LONGEST_RECORD
         ).records:
             if isinstance(record, Chunk):
-                size = max(
-                    record.uncompressed_size, zstandard.frame_content_size(record.data)
-                )
-                if size > _LARGEST_CHUNK:
-                    raise ValueError(f"a chunk of {size} bytes")
+                size = record.uncompressed_size
+                with contextlib.suppress(zstandard.ZstdError):
+                    size = max(size, zstandard.frame_content_size(record.data))
+                # The library unpacks lz4 without a limit.
+                if size > _LARGEST_CHUNK or record.compression == "lz4":
+                    raise ValueError(f"a chunk of {size} bytes, {record.compression}")
     stream.seek(0)
 
 
-# --- parts, and what a crash left -------------------------------------------------
+# --- excerpts, and files that a crash left ----------------------------------------
 
 
+@disk_errors()
 def write_excerpt(folder: Path, target: Path, since: float, until: float) -> int:
-    """Copy what came in between two moments (Unix s); returns how many messages.
+    """Copy messages between two moments (Unix s); returns their number.
 
-    A file that is damaged gives what can be read of it.
+    From a damaged file the readable messages are copied.
 
     Raises:
         HopError: the disk is full or away.
     """
-    try:
-        excerpt = McapFile(target, Instant(0.0, since))
-        paths = sorted(folder.glob("*.mcap*"))
-        copied = sum(_copy(path, excerpt, since, until) for path in paths)
-        excerpt.finish()
-    except OSError as error:
-        raise HopError("disk", error.strerror or str(error)) from error
+    excerpt = McapFile(target, Instant(0.0, since))
+    copied = sum(
+        _copy(path, excerpt, since, until) for path in sorted(folder.glob("*.mcap*"))
+    )
+    excerpt.finish()
     return copied
 
 
 def finish_broken(path: Path) -> None:
-    """Put in the place of a file without an end what can be read of it, with an index.
+    """Replace an unfinished file by its readable messages, with an index.
 
-    Takes minutes for an hour of many robots: not for the server's own process.
+    It takes minutes for an hour of many robots: not for the server's own process.
 
     Raises:
         HopError: the disk is full or away.
@@ -229,10 +236,10 @@ def finish_broken(path: Path) -> None:
         file.finish()
         rescued.rename(path.with_suffix(""))
     except DataFileError as error:
-        # Not even its beginning was on the disk.
+        # The crash came before the beginning of the file was on the disk.
         _log.info("%s", error)
     except OSError as error:
-        # A disk that is full needs the room.
+        # Free the space: the disk may be full.
         rescued.unlink(missing_ok=True)
         raise HopError("disk", error.strerror or str(error)) from error
     path.unlink()
@@ -241,9 +248,9 @@ def finish_broken(path: Path) -> None:
 def _copy(
     source: Path, target: McapFile, since: float = 0.0, until: float = FOREVER
 ) -> int:
-    """Copy messages as far as they can be read; returns how many."""
+    """Copy readable messages; returns their number."""
     copied = 0
-    # The file that is written gets another name when it is finished.
+    # Missing: the open file is renamed when it is finished.
     with contextlib.suppress(DataFileError, FileNotFoundError):
         for channel, log_time, payload in read_messages(source, since, until):
             target.add_at(channel, log_time, payload)

@@ -1,7 +1,7 @@
-"""Pictures of the past: what pages were sent, found in files by its moment.
+"""Pictures of the past: data that pages were sent, found in files by time.
 
-A file begins with a whole picture and has another every ten seconds; between two of
-them, five times a second, stands what changed.
+A file begins with a whole picture and has another every ten seconds.  Five times a
+second between them it has the changes.
 """
 
 import contextlib
@@ -10,30 +10,33 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from iveg.adapters.recordings.directory import name_of
+from iveg.adapters.files import disk_errors
+from iveg.adapters.recordings.directory import file_name
 from iveg.adapters.recordings.mcap_file import FOREVER, Channel, read_messages
-from iveg.domain.errors import DataFileError, HopError, NotRecordedError
+from iveg.domain.errors import DataFileError, NotRecordedError
 
 PICTURES: Final = Channel("/iveg/pictures", "iveg.Picture")
 WHOLE, CHANGED = b'{"whole":true,', b'{"whole":false,'
-"""Beginnings of pictures."""
+"""First bytes of a whole picture and of changes."""
 WHOLE_S: Final = 10.0
-"""Between two whole pictures."""
+"""Time between two whole pictures (s)."""
+FOLDER: Final = "pictures"
+"""Folder of pictures in that of the recordings of inputs."""
 PICTURES_S: Final = 300.0
-"""Length of a file; short where the one that is written is read through."""
+"""Length of a file (s): short, as the open file has no index and is read through."""
 _NS: Final = 10**9
 _GAP_S: Final = 2.0
-"""Where there is no picture for longer, nothing was recorded."""
+"""Longest time without a picture that still counts as recorded (s)."""
 _SLACK_S: Final = 30.0
-"""A name may differ so much from the first moment of its file (s)."""
+"""Greatest difference between a file's name and its first moment (s)."""
 
 
 class Pictures(NamedTuple):
-    """A whole picture and the changes since, oldest first.
+    """A whole picture and the changes after it, oldest first.
 
     Attributes:
-        at: The moment of the newest (Unix s).
-        payloads: As they were written.
+        at: Time of the newest (Unix s).
+        payloads: Their JSON, as written.
     """
 
     at: float
@@ -41,31 +44,26 @@ class Pictures(NamedTuple):
 
 
 class PictureFiles:
-    """The pictures of a folder; blocking.
+    """Pictures of a folder; blocking.
 
     Args:
-        folder: May be missing.
+        folder: Folder, which may be missing.
     """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
+    @disk_errors()
     def by(self, wall: float) -> Pictures:
-        """Pictures that lead to that of a moment (Unix s).
+        """Pictures from which the picture of a moment is made (Unix s).
 
-        Where the wall clock was set back, two files have the same moments: the one
-        that began at the later time counts.
+        Where the wall clock was set back, two files have the same moments: the file
+        with the later beginning counts.
 
         Raises:
-            NotRecordedError: there is none.
+            NotRecordedError: nothing was recorded then.
             HopError: the disk refuses.
         """
-        try:
-            return self._find(wall)
-        except OSError as error:
-            raise HopError("disk", error.strerror or str(error)) from error
-
-    def _find(self, wall: float) -> Pictures:
         paths = self._near(wall)
         for path in reversed(paths):
             pictures = _chain(path, wall)
@@ -77,38 +75,36 @@ class PictureFiles:
         raise NotRecordedError(wall, before, after)
 
     def _near(self, wall: float) -> Sequence[Path]:
-        """Files that may have a moment, with the last before and the first after."""
+        """Files that may hold a moment, with the last before and the first after."""
         paths = sorted(self._folder.glob("*.mcap*"))
         names = [path.name for path in paths]
-        began = bisect_right(names, name_of(wall - PICTURES_S - _SLACK_S))
-        begins_later = bisect_right(names, name_of(wall + _SLACK_S))
+        began = bisect_right(names, file_name(wall - PICTURES_S - _SLACK_S))
+        begins_later = bisect_right(names, file_name(wall + _SLACK_S))
         return paths[max(0, began - 1) : begins_later + 1]
 
 
 def _chain(path: Path, wall: float) -> Pictures | None:
-    """The last whole picture by a moment and what follows; None: there is none.
+    """The last whole picture before a moment and its changes; None: there is none.
 
-    A damaged chunk breaks the chain: what follows it has lost its beginning.
+    A damaged chunk ends the chain: later changes have lost their whole picture.
     """
     chain: list[tuple[int, bytes]] = []
-    # The moment itself counts.
-    until = wall + 0.001
-    for at, payload in _messages(path, wall - WHOLE_S - _GAP_S, until):
+    # The end is exclusive, and the moment itself counts.
+    for at, payload in _messages(path, wall - WHOLE_S - _GAP_S, wall + 0.001):
         if payload.startswith(WHOLE):
             chain.clear()
         if chain or payload.startswith(WHOLE):
             chain.append((at, payload))
     if not chain:
         return None
-    moments, payloads = zip(*chain, strict=True)
-    return Pictures(moments[-1] / _NS, payloads)
+    return Pictures(chain[-1][0] / _NS, [payload for _, payload in chain])
 
 
 def _messages(
     path: Path, since: float = 0.0, until: float = FOREVER
 ) -> Iterator[tuple[int, bytes]]:
     """Moments (ns) and payloads of pictures, as far as a file can be read."""
-    # A file that was finished meanwhile has another name.
+    # A file that has been finished since was renamed.
     path = path if path.exists() else path.with_suffix("")
     with contextlib.suppress(DataFileError):
         for channel, at, payload in read_messages(path, since, until):

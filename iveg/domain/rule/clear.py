@@ -1,4 +1,4 @@
-"""Conditions of the claim "clear", and which of them each robot does not meet now.
+"""Conditions of the claim "clear", and those that each robot does not meet now.
 
 A factor of 1.0 says that nobody is near.  That claim rests on the robot's own pose, on
 the detectors of everybody in reach, and on nobody in reach being in doubt
@@ -23,8 +23,9 @@ class ClearCondition:
     """One condition that does not hold.
 
     Attributes:
-        reason: A pose that is not young, a robot in doubt, a detector not read whole.
-        robot_id: Whose pose, detector or word it is.
+        reason: ``pose``: the robot's own pose is too old; ``doubt``: a robot is in
+            doubt; ``detector``: nothing proves that a detector works.
+        robot_id: The robot that leaves the condition unmet.
     """
 
     reason: Reason
@@ -32,7 +33,7 @@ class ClearCondition:
 
     @property
     def limit_reason(self) -> str:
-        """Reason of a speed limit that rests on it (docs/interfaces/mqtt.md)."""
+        """Reason of the speed limit that it causes (docs/interfaces/mqtt.md)."""
         return "doubt" if self.reason == "doubt" else "stale"
 
 
@@ -44,7 +45,7 @@ def unmet_conditions(
     unmet = [
         (observer, conditions)
         for observer in robots
-        if (conditions := _conditions(observer, now))
+        if (conditions := [*_conditions(observer, now)])
     ]
     return {robot.robot_id: tuple(_unmet_by(robot, unmet, now)) for robot in robots}
 
@@ -54,7 +55,7 @@ def _unmet_by(
     unmet: Sequence[tuple[RobotState, Sequence[ClearCondition]]],
     now: Instant,
 ) -> Iterator[ClearCondition]:
-    """Its own pose is young, and nobody in its reach leaves a condition unmet."""
+    """Unmet conditions of a robot: of its own pose, then of every robot in reach."""
     age = robot.age_s(now)
     if age is None or age > LIMITS.silence_s:
         yield ClearCondition("pose", robot.robot_id)
@@ -66,35 +67,33 @@ def _unmet_by(
 def _is_in_reach(robot: RobotState, observer: RobotState) -> bool:
     """Whether a robot may be where the observer's camera would protect it.
 
-    A robot of unknown place may be anywhere.  What a recording lacks concerns
-    recordings of its own frame.
+    A robot without a known place may be anywhere.  A recording's conditions concern
+    recordings of the same map alone.
     """
     if observer is robot:
         return True
     if observer.recording != robot.recording:
         return False
-    theirs, ours = observer.possible_poses(), robot.possible_poses()
+    observer_poses, robot_poses = observer.possible_poses(), robot.possible_poses()
+    # The zone of a person at the end of the camera's range reaches farther by this.
     reach_m = observer.profile.camera_range + LIMITS.zone_most_m
     return (
-        not theirs
-        or not ours
+        not observer_poses
+        or not robot_poses
         or any(
-            one.distance_to(two.x, two.y) <= reach_m for one in theirs for two in ours
+            pose.distance_to(own.x, own.y) <= reach_m
+            for pose in observer_poses
+            for own in robot_poses
         )
     )
 
 
-def _conditions(observer: RobotState, now: Instant) -> list[ClearCondition]:
+def _conditions(observer: RobotState, now: Instant) -> Iterator[ClearCondition]:
     """Conditions that one robot leaves unmet for everybody in its reach."""
-    return [
-        ClearCondition(reason, observer.robot_id) for reason in _reasons(observer, now)
-    ]
-
-
-def _reasons(observer: RobotState, now: Instant) -> Iterator[Reason]:
     if observer.doubts.active(now):
-        yield "doubt"
+        yield ClearCondition("doubt", observer.robot_id)
     detector = observer.detector
     is_required = observer.description.has_detector and not observer.is_replay
+    # Where no detector is required a refused frame still counts: it may show somebody.
     if detector.is_missing(now) if is_required else detector.is_flawed(now):
-        yield "detector"
+        yield ClearCondition("detector", observer.robot_id)

@@ -1,10 +1,10 @@
-"""Encounters before they happen: whose zone each robot will reach, and when.
+"""Encounters before they happen: zones that each robot will reach, and when.
 
 The paper asks for a "preemptive velocity reduction" if a robot's own path meets the
-safety zone of a person.  The path is the robot's own plan where it tells one, else the
-arc of its twist; people and peers go on as they were seen to go, so nobody is slowed
-for what a person could do at worst.  An encounter only adds: the zone itself counts as
-before (docs/safety.md, "Foresight").
+safety zone of a person.  The path is the robot's own plan where it publishes one, else
+the arc of its twist.  People and peers keep the velocity that was seen, so nobody is
+slowed for what a person could do at worst.  An encounter only adds: the zone itself
+counts as before (docs/safety.md, "Foresight").
 """
 
 import math
@@ -15,12 +15,12 @@ from typing import Literal
 import numpy as np
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.paths import (
     MOVES_M_S,
     PLAN_LASTS_S,
+    MovingZone,
     MovingZones,
     Path,
     path_ahead,
@@ -29,8 +29,8 @@ from iveg.domain.rule.paths import (
 from iveg.domain.rule.zones import Zone
 from iveg.domain.world import World
 
-_CAME_TRUE = ((0.5, 1.0, 1.5, 2.0, 2.5, 3.0), (0.98, 0.93, 0.92, 0.88, 0.83, 0.78))
-"""Measured (``benchmarks.foresight``; docs/experiment.md, "Foresight")."""
+_CAME_TRUE = ((0.5, 1.0, 1.5, 2.0, 2.5, 3.0), (0.97, 0.96, 0.93, 0.87, 0.86, 0.89))
+"""Time ahead (s), and the share of forecasts that came true (docs/experiment.md)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,13 +38,13 @@ class Encounter:
     """A robot will reach a zone.
 
     Attributes:
-        effect: ``slows``: on its present path, from the braking time on; ``holds``: a
-            slow robot would at the speed of before, so it is not let go that is slow
-            for this cause already.
-        in_s: How soon, counted from ``at`` (s).
-        at: When it was foretold (monotonic, s).
-        x: Where the robot will be in ``map`` (m); ``y`` likewise.
-        centre_x: Where the zone's centre will be (m); ``centre_y`` likewise.
+        effect: ``slows``: on the present path; the robot slows when only its braking
+            time is left.  ``holds``: at its speed before it slowed; its limit for this
+            cause stays.
+        in_s: Time to the encounter, counted from ``at`` (s).
+        at: Moment of the forecast (monotonic, s).
+        x: Place of the robot then, in ``map`` (m); ``y`` likewise.
+        centre_x: Place of the zone's centre then (m); ``centre_y`` likewise.
     """
 
     zone: Zone
@@ -62,7 +62,7 @@ class Encounter:
 
 
 def probability(in_s: float) -> float:
-    """Share (0 to 1) of the encounters foretold so far ahead (s) that came true."""
+    """Share (0 to 1) of forecasts this far ahead (s) that came true."""
     return float(np.interp(in_s, *_CAME_TRUE))
 
 
@@ -77,19 +77,22 @@ def look_ahead(
     now: Instant,
     speeds_before: Mapping[str, float],
 ) -> Encounters:
-    """The encounters of the fleet now.
+    """Encounters of the fleet, forecast now.
 
     Args:
         world: Its robots.
-        zones: Of people and peers; recordings slow nobody before they are there.
-        rule: How far ahead to look.
+        zones: Zones of people and peers; those of recordings get no forecast.
+        rule: The rule, with its horizon.
         now: This moment.
-        speeds_before: Of the robots that are slow, before that (m/s).
+        speeds_before: Speed of each slow robot before it slowed (m/s).
     """
-    known = [one for one in zones if _goes_on_as_seen(one, now)]
-    ahead = _Ahead(known, MovingZones([_row(one, world, now) for one in known]), rule)
+    # A forecast from the centre of a grown zone would be a guess, and slow every robot.
+    known = [zone for zone in zones if not zone.is_grown and zone.recording is None]
+    forecaster = _Forecaster(
+        known, MovingZones([_moving(zone, world, now) for zone in known]), rule
+    )
     return {
-        robot.robot_id: ahead.encounters_of(
+        robot.robot_id: forecaster.encounters_of(
             robot, speeds_before.get(robot.robot_id), now
         )
         for robot in world.live_robots()
@@ -97,18 +100,8 @@ def look_ahead(
     }
 
 
-def _goes_on_as_seen(zone: Zone, now: Instant) -> bool:
-    """Whether it is known how a zone's centre goes on.
-
-    Somebody out of sight may be anywhere in a zone that grows: where that will be is no
-    forecast, and would slow everybody.
-    """
-    is_seen = zone.sighting is None or zone.sighting.age_s(now) <= LIMITS.seen_s
-    return is_seen and zone.recording is None
-
-
-def _row(zone: Zone, world: World, now: Instant) -> tuple[float, ...]:
-    """Place (m), velocity (m/s), age (s) and radius (m) of a zone."""
+def _moving(zone: Zone, world: World, now: Instant) -> MovingZone:
+    """A zone with the velocity of the person or peer in it."""
     sighting, radius = zone.sighting, zone.radius_m
     if sighting is None:
         peer = world.robot(zone.cause)
@@ -116,15 +109,18 @@ def _row(zone: Zone, world: World, now: Instant) -> tuple[float, ...]:
         assert odometry is not None  # noqa: S101 - its zone is drawn around its pose
         pose, twist = peer.motion(now).ahead(odometry.pose, odometry.twist)
         age = 0.0 if since is None else max(0.0, now.mono - since)
-        goes = twist.linear_x * math.cos(pose.yaw), twist.linear_x * math.sin(pose.yaw)
-        return zone.x, zone.y, *goes, age, radius
+        vx, vy = (
+            twist.linear_x * math.cos(pose.yaw),
+            twist.linear_x * math.sin(pose.yaw),
+        )
+        return MovingZone(zone.x, zone.y, vx, vy, age, radius)
     age = sighting.age_s(now)
-    return zone.x, zone.y, sighting.vx, sighting.vy, age, radius
+    return MovingZone(zone.x, zone.y, sighting.vx, sighting.vy, age, radius)
 
 
 @dataclass(frozen=True, slots=True)
-class _Ahead:
-    """Zones of which it is known how they go on."""
+class _Forecaster:
+    """Zones with known motion, and the rule for forecasts."""
 
     zones: Sequence[Zone]
     moving: MovingZones
@@ -133,31 +129,32 @@ class _Ahead:
     def encounters_of(
         self, robot: RobotState, speed_before: float | None, now: Instant
     ) -> Mapping[str, Encounter]:
-        """The first encounter of a robot with each cause."""
-        found = self._met_on(path_of(robot, now), "slows", now)
+        """First encounter of a robot with each cause."""
+        encounters = self._encounters_on(path_of(robot, now), "slows", now)
         if speed_before is not None:
             faster = path_of(robot, now, speed_before)
-            found = {**self._met_on(faster, "holds", now), **found}
-        return found
+            # An encounter on the present path goes before one at the earlier speed.
+            encounters = {**self._encounters_on(faster, "holds", now), **encounters}
+        return encounters
 
-    def _met_on(
+    def _encounters_on(
         self, path: Path, effect: Literal["slows", "holds"], now: Instant
     ) -> dict[str, Encounter]:
-        """A path's first encounter with each cause in whose zones it does not begin."""
+        """First encounter of a path with each cause, except zones that it begins in."""
         inside, meetings = self.moving.met_by(path)
         within = {self.zones[number].cause for number in inside}
-        found = dict[str, Encounter]()
-        for met in sorted(meetings, key=lambda one: one.in_s):
-            zone = self.zones[met.zone]
-            if zone.cause not in within and self.rule.foresees(met.in_s):
-                places = met.x, met.y, met.centre_x, met.centre_y
-                first = Encounter(zone, effect, met.in_s, now.mono, *places)
-                found.setdefault(zone.cause, first)
-        return found
+        encounters = dict[str, Encounter]()
+        for meeting in sorted(meetings, key=lambda meeting: meeting.in_s):
+            zone = self.zones[meeting.zone]
+            if zone.cause not in within and self.rule.foresees(meeting.in_s):
+                places = meeting.x, meeting.y, meeting.centre_x, meeting.centre_y
+                first = Encounter(zone, effect, meeting.in_s, now.mono, *places)
+                encounters.setdefault(zone.cause, first)
+        return encounters
 
 
 def path_of(robot: RobotState, now: Instant, at_least: float = 0.0) -> Path:
-    """Where a robot will be in the next three seconds, at least so fast (m/s)."""
+    """Path of a robot in the next three seconds, at ``at_least`` (m/s) or faster."""
     odometry, navigation = robot.odometry, robot.navigation
     assert odometry is not None  # noqa: S101 - only a robot that drives has a path
     since = robot.navigation_received
@@ -174,19 +171,19 @@ RANKS: Mapping[str, int] = {
     "goal": 2,
     "hauling": 3,
 }
-"""Tasks by their word (``task`` of a robot's navigation): the greater goes first, a
-load before an errand, that before a look around.  Any other word gives no right."""
+"""Rank of each task (``task`` of a robot's navigation); the greater rank goes first: a
+load before an errand, an errand before a look around.  Another word has no rank."""
 
 
 def gives_way_to(
     robot: RobotState, zones: Sequence[Zone], world: World, now: Instant
 ) -> frozenset[str]:
-    """The peers among the causes of these zones whose task is the greater one.
+    """Peers among the causes of these zones whose task has the greater rank.
 
     The paper: "in the absence of human presence, the system manages multi-robot
-    interactions by evaluating the task status of detected peers".  The robot with the
-    lesser task slows as soon as the encounter is foretold; for the other all stays as
-    it is, so nobody is ever faster for it (docs/decisions/0007-right-of-way.md).
+    interactions by evaluating the task status of detected peers".  The robot of
+    lesser rank slows as soon as the encounter is forecast.  The other robot drives
+    on, so right of way makes no robot faster (docs/decisions/0007-right-of-way.md).
     """
     rank = _rank(robot, now)
     if rank is None or any(zone.reason == "person" for zone in zones):
@@ -199,8 +196,8 @@ def gives_way_to(
 
 
 def _rank(robot: RobotState, now: Instant) -> int | None:
-    """The rank of a task that was told lately; None: unknown."""
-    heard, navigation = robot.navigation_received, robot.navigation
-    if navigation is None or heard is None or now.mono - heard.mono > PLAN_LASTS_S:
+    """Rank of a robot's task; None: the word is unknown, or no task came lately."""
+    since, navigation = robot.navigation_received, robot.navigation
+    if navigation is None or since is None or now.mono - since.mono > PLAN_LASTS_S:
         return None
     return RANKS.get(navigation.task.strip().lower())

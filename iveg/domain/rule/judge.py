@@ -1,8 +1,8 @@
 """Speed limits of the fleet at one moment, with their causes: the rule itself.
 
 Algorithms 2 and 3 of the paper; comments quote their lines.  A robot inside the zone of
-a person or of a moving peer, or about to reach it, is limited to half speed.  It is let
-go 0.3 m outside the zone and 1.0 s later, so that noise does not flap
+a person or of a moving peer, or about to reach it, is limited to half speed.  It is
+released once it has been 0.3 m outside the zone for 1.0 s, so that noise does not flap
 (docs/safety.md, "The rule").  The least factor counts, never the product.  Outside all
 zones a robot is clear only while every condition of that claim holds (``clear``).
 """
@@ -32,6 +32,7 @@ from iveg.domain.rule.zones import (
 from iveg.domain.tracking.people import People
 from iveg.domain.world import World
 
+# A limit names one cause, and a person goes before a peer.
 _GRAVEST = ("person", "robot")
 
 
@@ -39,9 +40,8 @@ class SpeedLimits:
     """Keeps the zone entries of the fleet and gives every robot its speed limit.
 
     Attributes:
-        unmet: Conditions of "clear" that do not hold for each robot, since the last
-            judgement.
-        encounters: Encounters ahead, of the last fifth of a second.
+        unmet: Clear conditions that each robot does not meet, by the last judgement.
+        encounters: Encounters by the last forecast (every 0.2 s).
     """
 
     def __init__(self, greenhouse: Greenhouse) -> None:
@@ -52,22 +52,20 @@ class SpeedLimits:
         self.encounters: Encounters = {}
         self._looked_at = -math.inf
         self._fastest: dict[str, float] = {}
-        """Speed of slow robots, before and since (m/s)."""
-        self._limits: dict[str, SpeedLimit] = {}
-        """Limits of the last judgement."""
+        """Greatest speed of each slow robot, before it slowed and since (m/s)."""
 
     def copy(self) -> "SpeedLimits":
-        """Another with the same entries and encounters."""
+        """Copy with the same entries and encounters."""
         other = SpeedLimits(self._greenhouse)
-        other._open = {name: {**mine} for name, mine in self._open.items()}
+        other._open = {name: {**entries} for name, entries in self._open.items()}
         other.encounters, other._looked_at = self.encounters, self._looked_at
         other._fastest = {**self._fastest}
         return other
 
     @property
     def entries(self) -> Iterable[ZoneEntry]:
-        """Every entry that has begun and not ended."""
-        return [one for mine in self._open.values() for one in mine.values()]
+        """Every zone entry that has begun and not ended."""
+        return [entry for entries in self._open.values() for entry in entries.values()]
 
     def evaluate(
         self,
@@ -96,16 +94,12 @@ class SpeedLimits:
         # "Speed -> 100 % upon clearance".
         self.unmet = unmet_conditions(world, now)
         # Algorithm 3, lines 11 and 17: "V_linear = V_input x 0.5".
-        limits = {name: self._speed_limit(name) for name in self.unmet}
-        # What feedback shares is written once for as long as it is the very same.
-        if limits != self._limits:
-            self._limits = limits
-        return self._limits, changes
+        return {name: self._speed_limit(name) for name in self.unmet}, changes
 
     def _look_ahead(
         self, world: World, zones: Iterable[Zone], rule: DetectionRule, now: Instant
     ) -> None:
-        """Find the encounters ahead, five times a second."""
+        """Forecast encounters, five times a second."""
         if not rule.foresight:
             self.encounters, self._looked_at = {}, -math.inf
         elif not 0.0 <= now.mono - self._looked_at < EVERY_S - 1e-6:
@@ -113,74 +107,78 @@ class SpeedLimits:
             self._fastest = {
                 robot_id: max(
                     self._fastest.get(robot_id, 0.0),
-                    # A robot that is slow early for a task was perhaps not fast yet.
+                    # A robot that gave way early had perhaps not reached its speed yet.
                     world.robots[robot_id].track.motion.speed,
-                    *(one.speed_before for one in mine.values()),
+                    *(entry.speed_before for entry in entries.values()),
                 )
-                for robot_id, mine in self._open.items()
-                if mine
+                for robot_id, entries in self._open.items()
+                if entries
             }
             self.encounters = look_ahead(world, zones, rule, now, self._fastest)
 
     def _soon_inside(
         self, robot: RobotState, world: World, now: Instant
     ) -> dict[str, Distance]:
-        """Zones ahead that count as if the robot were at their border now.
+        """Zones that count as if the robot were at their border now.
 
-        An encounter counts from the time on that slowing down takes, and at once where
-        the robot gives way.  A robot that is slow for one stays so while it lies ahead,
-        also if it would only at the speed of before: it shall not speed up for that.
+        An encounter counts as soon as only the time for slowing down is left, and at
+        once where the robot gives way.  A robot that slowed for a cause stays slow
+        while it would reach it, at the earlier speed too: else the robot would speed up
+        into the zone.
         """
-        ahead = self.encounters.get(robot.robot_id)
-        if robot.odometry is None or not ahead:
+        encounters = self.encounters.get(robot.robot_id)
+        if robot.odometry is None or not encounters:
             return {}
-        mine = self._open.get(robot.robot_id, {})
-        on_path = [one for one in ahead.values() if one.effect == "slows"]
-        near = [*(one.zone for one in on_path), *(one.zone for one in mine.values())]
-        yields_to = gives_way_to(robot, near, world, now)
+        entries = self._open.get(robot.robot_id, {})
+        on_path = [item for item in encounters.values() if item.effect == "slows"]
+        zones_near = [item.zone for item in on_path]
+        zones_near += [entry.zone for entry in entries.values()]
+        yields_to = gives_way_to(robot, zones_near, world, now)
         soon_s = slows_within_s(robot.profile.braking, robot.track.motion.speed)
-        soon = {one.zone.cause for one in on_path if one.in_s <= soon_s}
-        pose = robot.odometry.pose
+        soon = {item.zone.cause for item in on_path if item.in_s <= soon_s}
+        pose, counted = robot.odometry.pose, {*soon, *yields_to, *entries}
+        zones = [item.zone for cause, item in encounters.items() if cause in counted]
         return {
-            cause: Distance(0.0, pose.distance_to(one.zone.x, one.zone.y), one.zone)
-            for cause, one in ahead.items()
-            if cause in mine or cause in soon or cause in yields_to
+            zone.cause: Distance(0.0, pose.distance_to(zone.x, zone.y), zone)
+            for zone in zones
         }
 
     def _enter_and_leave(
         self, robot: RobotState, near: Distances, now: Instant, ids: Iterator[str]
     ) -> Iterator[LimitChange]:
         """Begin, continue and end the entries of one robot."""
-        mine = self._open.setdefault(robot.robot_id, {})
-        for cause, one in near.items():
-            if cause in mine:
-                mine[cause] = mine[cause].moved(one.outside_m, one.centre_m, now)
-            elif one.outside_m <= 0.0:
-                foretold_s = self._foretold_s(robot.robot_id, one.zone, one.centre_m)
-                sight = self._greenhouse
-                mine[cause] = enter(robot, one, sight, foretold_s, now, next(ids))
-                yield LimitChange(mine[cause], began=True)
-        for cause, entry in list(mine.items()):
+        entries = self._open.setdefault(robot.robot_id, {})
+        for cause, (outside_m, centre_m, zone) in near.items():
+            if cause in entries:
+                entries[cause] = entries[cause].moved(outside_m, centre_m, now)
+            elif outside_m <= 0.0:
+                foretold_s = self._foretold_s(robot.robot_id, zone, centre_m)
+                entries[cause] = enter(
+                    robot, near[cause], self._greenhouse, foretold_s, now, next(ids)
+                )
+                yield LimitChange(entries[cause], began=True)
+        for cause, entry in list(entries.items()):
             if cause not in near:
-                entry = mine[cause] = entry.moved(math.inf, entry.distance_m, now)
+                # No zone of this cause is left: its time outside begins or goes on.
+                entry = entries[cause] = entry.moved(math.inf, entry.distance_m, now)
             if entry.is_over(now):
-                del mine[cause]
+                del entries[cause]
                 yield LimitChange(entry, began=False)
 
     def _foretold_s(self, robot_id: str, zone: Zone, distance_m: float) -> float | None:
-        """When a robot will reach a cause's zone (s); None: it is inside, or leaves."""
+        """Forecast time to a cause's zone (s); None: the robot is inside, or leaves."""
         encounter = self.encounters.get(robot_id, {}).get(zone.cause)
         if encounter is None or encounter.effect == "holds":
             return None
         return None if distance_m <= zone.radius_m else encounter.in_s
 
     def _speed_limit(self, robot_id: str) -> SpeedLimit:
-        """The most specific reason wins: an unmet condition comes last."""
-        mine = self._open.get(robot_id)
-        if mine:
+        """Limit of a robot by its gravest zone entry, else by an unmet condition."""
+        entries = self._open.get(robot_id)
+        if entries:
             worst = min(
-                mine.values(),
-                key=lambda one: (_GRAVEST.index(one.zone.reason), one.distance_m),
+                entries.values(),
+                key=lambda entry: (_GRAVEST.index(entry.zone.reason), entry.distance_m),
             )
             return SpeedLimit(
                 HALF_SPEED,
@@ -189,7 +187,7 @@ class SpeedLimits:
                 worst.distance_m,
                 worst.decision_id,
                 self._foretold_s(robot_id, worst.zone, worst.distance_m),
-                all(one.outside_since is not None for one in mine.values()),
+                all(entry.outside_since is not None for entry in entries.values()),
             )
         for first in self.unmet[robot_id]:
             return SpeedLimit(HALF_SPEED, first.limit_reason, first.robot_id)

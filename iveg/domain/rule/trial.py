@@ -1,8 +1,8 @@
-"""The account of a trial: a candidate version of the rule beside the one in force.
+"""Account of a trial: a candidate version of the rule beside the version in force.
 
 Both judge the same inputs at the same moments; the candidate acts on nothing.  Robots
-drive as the version in force has them drive, so what they would have done under the
-candidate is not known: the account says when the two would have told them otherwise.
+drive by the limits of the version in force.  What they would do under the candidate is
+not known: the account says when the limits of the two versions differ.
 """
 
 from collections import Counter, defaultdict, deque
@@ -19,21 +19,21 @@ from iveg.domain.rule.zones import LimitChange
 MOST_KEPT: Final = 200
 """Differences in the list; all are counted."""
 _LONGEST_S: Final = 1.0
-"""A judgement after a longer silence does not stand for all of it."""
+"""Longest time that one judgement stands for (s)."""
 Limits = Mapping[str, SpeedLimit]
 Kind = Literal["slows", "frees"]
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A time in which the two would have told a robot otherwise.
+    """A period in which the two versions limit a robot differently.
 
     Attributes:
-        kind: ``slows``: the candidate alone would have slowed it; ``frees``: it alone
-            would not.
-        reason: Of the one that slows; ``cause`` likewise.
-        decision_id: Of the version in force; None where it slows for no decision.
-        began: Unix seconds; ``ended`` likewise, None while it goes on.
+        kind: ``slows``: only the candidate would slow the robot; ``frees``: only the
+            version in force slows it.
+        reason: Reason of the limit that slows; ``cause`` likewise.
+        decision_id: Decision of the version in force; None where it has none.
+        began: Start (Unix s); ``ended`` likewise, None while it goes on.
     """
 
     robot_id: str
@@ -47,13 +47,13 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A trial as it stands.
+    """A trial and its present account.
 
     Attributes:
         rule: The candidate.
-        by: Who began it; ``since`` when (Unix s).
-        so_far: What came of it; None before the first judgement.
-        differences: The newest, oldest first.
+        by: The operator who began it; ``since`` when (Unix s).
+        so_far: Its sums; None before the first judgement.
+        differences: The newest differences, oldest first.
     """
 
     rule: DetectionRule
@@ -64,7 +64,7 @@ class Trial:
 
 
 class Account:
-    """Compares, judgement by judgement."""
+    """Compares both versions, judgement by judgement."""
 
     def __init__(self, trial: Trial) -> None:
         self._trial = trial
@@ -73,8 +73,8 @@ class Account:
         self._open: dict[str, Difference] = {}
         self._at: float | None = None
 
-    def is_of(self, rule: DetectionRule) -> bool:
-        """Whether it compares with this version; else it is over."""
+    def compares_with(self, rule: DetectionRule) -> bool:
+        """Whether its sums compare with this version; with another it is over."""
         return self._so_far is None or self._so_far.against == rule.version
 
     def judged(
@@ -84,13 +84,13 @@ class Account:
         candidate: tuple[Limits, Iterable[LimitChange]],
         now: Instant,
     ) -> None:
-        """Take one judgement of both; of ``rule``, the version in force."""
-        passed = 0.0 if self._at is None else min(now.mono - self._at, _LONGEST_S)
+        """Add one judgement of both versions; ``rule`` is the version in force."""
+        elapsed_s = 0.0 if self._at is None else min(now.mono - self._at, _LONGEST_S)
         self._at, since = now.mono, self._trial.since
         before = self._so_far or Comparison(
             since, since, rule.version, 0.0, Doings(), Doings(), 0, 0
         )
-        begun = Counter(
+        new_differences = Counter(
             self._differ(robot_id, limit, candidate[0][robot_id], now.wall)
             for robot_id, limit in in_force[0].items()
             if robot_id in candidate[0]
@@ -99,49 +99,50 @@ class Account:
             before,
             until=now.wall,
             against=rule.version,
-            compared_s=before.compared_s + passed,
-            in_force=_with(before.in_force, *in_force, passed),
-            candidate=_with(before.candidate, *candidate, passed),
-            would_slow=before.would_slow + begun["slows"],
-            would_not=before.would_not + begun["frees"],
+            compared_s=before.compared_s + elapsed_s,
+            in_force=_with(before.in_force, *in_force, elapsed_s),
+            candidate=_with(before.candidate, *candidate, elapsed_s),
+            would_slow=before.would_slow + new_differences["slows"],
+            would_not=before.would_not + new_differences["frees"],
         )
 
     def _differ(
-        self, robot_id: str, in_force: SpeedLimit, would: SpeedLimit, wall: float
+        self, robot_id: str, in_force: SpeedLimit, candidate: SpeedLimit, wall: float
     ) -> Kind | None:
-        """Note what begins and ends now; returns what began."""
+        """Note a difference that begins or ends now; returns the kind that began."""
         before = self._open.get(robot_id)
         kind: Kind | None = None
-        if _slows(in_force) != _slows(would):
-            kind = "slows" if _slows(would) else "frees"
+        if _slows(in_force) != _slows(candidate):
+            kind = "slows" if _slows(candidate) else "frees"
+        # A difference that turns round ends, and a new one begins below.
         if before is not None and before.kind != kind:
             self._ended.append(replace(before, ended=wall))
             del self._open[robot_id]
         if kind is None or robot_id in self._open:
             return None
-        by = would if kind == "slows" else in_force
+        slowing = candidate if kind == "slows" else in_force
         decision_id = None if kind == "slows" else in_force.decision_id
         self._open[robot_id] = Difference(
-            robot_id, kind, by.reason, by.cause, decision_id, wall
+            robot_id, kind, slowing.reason, slowing.cause, decision_id, wall
         )
         return kind
 
     def trial(self) -> Trial:
         """The trial with its account so far."""
-        differences = (*self._ended, *self._open.values())
-        kept = differences[-MOST_KEPT:]
-        return replace(self._trial, so_far=self._so_far, differences=kept)
+        newest = (*self._ended, *self._open.values())[-MOST_KEPT:]
+        return replace(self._trial, so_far=self._so_far, differences=newest)
 
 
 def _with(
     done: Doings, limits: Limits, changes: Iterable[LimitChange], passed_s: float
 ) -> Doings:
     """Sums of a version after one more judgement."""
+    # The limits of this judgement stand for the time since the one before.
     slowed_s = defaultdict(float, done.slowed_s)
     for limit in filter(_slows, limits.values()):
         slowed_s[limit.reason] += passed_s
     encounters = Counter(done.encounters)
-    encounters.update(one.entry.zone.reason for one in changes if one.began)
+    encounters.update(change.entry.zone.reason for change in changes if change.began)
     return Doings(slowed_s, encounters)
 
 

@@ -1,4 +1,4 @@
-"""Zones round people and peers, which slow robots, and entries of robots into them."""
+"""Zones round people and peers, which slow robots, and robots' entries into them."""
 
 import math
 from collections import defaultdict
@@ -14,11 +14,11 @@ from iveg.domain.limits import LIMITS, grown_radius
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.people import People
-from iveg.domain.tracking.person import Sighting, TrackedPerson
+from iveg.domain.tracking.tracker import Sighting, TrackedPerson
 from iveg.domain.world import World
 
 _ROUNDING_M = 0.01
-"""Rounding moves no robot that is farther outside a zone into it."""
+"""Bound of the rounding error (m): a robot farther outside a zone is not in it."""
 
 
 class Zone(NamedTuple):
@@ -26,13 +26,14 @@ class Zone(NamedTuple):
 
     Attributes:
         cause: The person or robot at its centre.
-        observer: Who saw it; the peer itself for a peer's own odometry.
+        observer: The robot that saw the cause; the peer itself by its own odometry.
         x: Centre in ``map`` (m); ``y`` likewise.
-        fresh_m: Radius while what made it is fresh (m).
-        sighting: What was seen; None for a peer's own odometry.
-        recording: The map frame of the recording that saw it, which slows recordings
-            of that frame alone; None: a live robot saw it.
-        alert_id: Of the alert that robots hear of it.
+        sighting: The sighting that made it; None: the peer's own odometry did.
+        recording: Map frame of the recording that saw the cause; the zone then slows
+            recordings of that frame alone.  None: a live robot saw it.
+        alert_id: Id of the alert in feedback; None of a peer.
+        is_grown: Whether its person was last seen so long ago that nobody knows where
+            in the zone they are.
     """
 
     reason: Literal["person", "robot"]
@@ -41,15 +42,10 @@ class Zone(NamedTuple):
     x: float
     y: float
     radius_m: float
-    fresh_m: float
     sighting: Sighting | None = None
     recording: str | None = None
     alert_id: str | None = None
-
-    @property
-    def is_grown(self) -> bool:
-        """Whether it is wider than while what made it was fresh."""
-        return self.radius_m > self.fresh_m
+    is_grown: bool = False
 
 
 def zones_of(
@@ -69,7 +65,6 @@ def _zones_of(
     rule: DetectionRule,
     now: Instant,
 ) -> Iterator[Zone]:
-    fresh_m = rule.radius_m.of(person.class_)
     for sighting, radius in people.zone_radii(person, rule, now):
         yield Zone(
             person.class_,
@@ -78,32 +73,34 @@ def _zones_of(
             sighting.x,
             sighting.y,
             radius,
-            fresh_m + sighting.beyond_m,
             sighting,
             world.robots[sighting.observer].recording,
             person.decision_id,
+            sighting.age_s(now) > LIMITS.seen_s,
         )
 
 
 def _zone_of_peer(
     peer: RobotState, rule: DetectionRule, now: Instant
 ) -> Iterator[Zone]:
-    """Zone of a peer that others give way to."""
+    """Zone of a peer that moves, or may have started unseen."""
     since = peer.likely_pose_at()
     # A recording cannot yield, and nobody yields to it.
     if peer.odometry is None or since is None or peer.is_replay:
         return
     age = max(0.0, now.mono - since)
     known = peer.age_s(now)
+    # A peer at rest is an obstacle like any other; a silent peer may have started.
     at_rest = peer.stands and known is not None and known <= LIMITS.silence_s
     if at_rest or age > LIMITS.zone_lasts_s:
         return
-    pose, name, fresh_m = peer.odometry.pose, peer.robot_id, rule.radius_m.of("robot")
-    yield Zone("robot", name, name, pose.x, pose.y, grown_radius(fresh_m, age), fresh_m)
+    pose, name = peer.odometry.pose, peer.robot_id
+    radius_m = grown_radius(rule.radius_m.for_class("robot"), age)
+    yield Zone("robot", name, name, pose.x, pose.y, radius_m)
 
 
 class Distance(NamedTuple):
-    """Distance of a robot from a zone: outside its border (m), from its centre (m)."""
+    """Distance of a robot from a zone's border, positive outside, and centre (m)."""
 
     outside_m: float
     centre_m: float
@@ -111,7 +108,7 @@ class Distance(NamedTuple):
 
 
 Distances = dict[str, Distance]
-"""Cause → distance to that of its zones in which the robot is deepest."""
+"""Cause → distance to the zone of this cause in which the robot is deepest."""
 
 
 def distances_to_zones(
@@ -119,46 +116,42 @@ def distances_to_zones(
     zones: Sequence[Zone],
     entries: Mapping[str, Iterable[str]],
 ) -> Iterator[tuple[RobotState, Distances]]:
-    """Each robot with the causes in whose zones it is, or has an entry.
+    """Distances of each robot to the causes whose zones it is in, or has entered.
 
     One comparison of all robots with all zones finds the few pairs that are near.
     """
     placed = [robot for robot in robots if robot.odometry is not None]
-    centres = np.array([(one.x, one.y, one.radius_m) for one in zones]).reshape(-1, 3)
+    table = np.array([(zone.x, zone.y, zone.radius_m) for zone in zones]).reshape(-1, 3)
     poses = np.array([_place(robot) for robot in placed]).reshape(-1, 2, 1)
-    x, y, radius_m = centres.T
+    x, y, radius_m = table.T
     outside_m = np.hypot(x - poses[:, 0], y - poses[:, 1]) - radius_m
-    inside: dict[int, set[int]] = defaultdict(set)
-    for row, column in np.argwhere(outside_m <= _ROUNDING_M).tolist():
-        inside[row].add(column)
-    of_cause: dict[str, list[int]] = defaultdict(list)
+    by_cause: dict[str, list[int]] = defaultdict(list)
     for column, zone in enumerate(zones):
-        of_cause[zone.cause].append(column)
-    for row, robot in enumerate(placed):
-        entered = entries.get(robot.robot_id, ())
-        near = inside[row].union(*(of_cause[cause] for cause in entered))
+        by_cause[zone.cause].append(column)
+    for robot, is_near in zip(placed, outside_m <= _ROUNDING_M, strict=True):
+        # An entry ends by distance, so its zones count however far they are.
+        entered = [by_cause[cause] for cause in entries.get(robot.robot_id, ())]
+        near = {*np.flatnonzero(is_near).tolist()}.union(*entered)
         yield robot, _distances(robot, [zones[column] for column in sorted(near)])
 
 
 def _place(robot: RobotState) -> tuple[float, float]:
-    assert robot.odometry is not None  # noqa: S101 - asked of no other
+    assert robot.odometry is not None  # noqa: S101 - only robots with a pose get here
     return robot.odometry.pose.x, robot.odometry.pose.y
 
 
 def _distances(robot: RobotState, zones: Iterable[Zone]) -> Distances:
-    """The deepest zone of each cause, without its own and those of other maps."""
+    """Deepest zone of each cause, without the robot's own and those of other maps."""
     nearest: Distances = {}
     (x, y), recording = _place(robot), robot.recording
     for zone in zones:
-        if zone.cause == robot.robot_id:
-            continue
-        if zone.recording not in (None, recording):
+        if zone.cause == robot.robot_id or zone.recording not in (None, recording):
             continue
         centre_m = math.hypot(zone.x - x, zone.y - y)
-        found = Distance(centre_m - zone.radius_m, centre_m, zone)
+        distance = Distance(centre_m - zone.radius_m, centre_m, zone)
         known = nearest.get(zone.cause)
-        if known is None or found.outside_m < known.outside_m:
-            nearest[zone.cause] = found
+        if known is None or distance.outside_m < known.outside_m:
+            nearest[zone.cause] = distance
     return nearest
 
 
@@ -166,13 +159,15 @@ class ZoneEntry(NamedTuple):
     """One robot inside one zone, from trigger to release.
 
     Attributes:
-        zone: The nearest zone of the cause at trigger.
-        distance_m: Now; ``entered_m`` at the trigger.
-        outside_since: When it was first found outside (monotonic, s).
-        foretold_s: When it would reach the zone, at the trigger (s); None: it was
-            inside.
-        in_sight: Whether the robot saw it itself, or had a line of sight to the centre
-            at the trigger.
+        zone: The deepest zone of the cause at the trigger.
+        entered_m: Distance from the zone's centre at the trigger (m).
+        speed_before: Speed at the trigger (m/s).
+        in_sight: Whether the robot saw the cause itself, or had a line of sight to the
+            centre, at the trigger.
+        distance_m: Distance from the centre now (m).
+        outside_since: Start of its time beyond the release distance (monotonic, s), or
+            None.
+        foretold_s: Forecast time to the zone at the trigger (s); None: it was inside.
     """
 
     decision_id: str
@@ -187,10 +182,11 @@ class ZoneEntry(NamedTuple):
     foretold_s: float | None = None
 
     def moved(self, outside_m: float, distance_m: float, now: Instant) -> "ZoneEntry":
-        """The entry with the robot so far outside the zone and from its centre (m)."""
+        """The entry at a new distance outside the zone and from its centre (m)."""
+        # A smaller distance outside is noise, and the time outside begins anew.
         since = None
         if outside_m > LIMITS.release_beyond_m:
-            since = self.outside_since or now.mono
+            since = now.mono if self.outside_since is None else self.outside_since
         return self._replace(distance_m=distance_m, outside_since=since)
 
     def is_over(self, now: Instant) -> bool:
@@ -207,7 +203,7 @@ def enter(
     now: Instant,
     decision_id: str,
 ) -> ZoneEntry:
-    """An entry that begins now; ``foretold_s``: in so long the robot reaches it (s)."""
+    """An entry that begins now; ``foretold_s``: forecast time to the zone (s)."""
     odometry, zone = robot.odometry, near.zone
     assert odometry is not None  # noqa: S101 - nothing is near without it
     pose, speed = odometry.pose, robot.motion(now).speed
@@ -218,7 +214,7 @@ def enter(
         entered=now,
         entered_m=near.centre_m,
         speed_before=speed,
-        # It sees what its own detector found, whatever leaves the plan knows of.
+        # A robot's own detection proves sight, whatever crop the plan has in between.
         in_sight=zone.observer == robot.robot_id
         or greenhouse.in_sight(pose.x, pose.y, zone.x, zone.y),
         distance_m=near.centre_m,

@@ -1,9 +1,11 @@
 """State of one STOP, RELEASE or RESUME at one moment, with the time of each step.
 
-A STOP's times are the press on the browser's clock, accepted (``requested``), sent and
-answered on each transport, and standing.  ``outcome_of`` reads the rows of the history:
-a row keeps the robot's state when the order was no longer followed, and "running" does
-not say how a STOP ended.  Both are described in docs/interfaces/resources.md.
+The times of a STOP are: pressed (browser's clock), accepted (``requested``), sent and
+answered on each transport, standing.
+
+``outcome_of`` reads rows of the history.  A row's state is the robot's when the order
+was last followed, and "running" does not say how a STOP ended.  State and outcome are
+described in docs/interfaces/resources.md.
 """
 
 from collections.abc import Iterable, Mapping
@@ -33,8 +35,9 @@ that the robot never confirmed."""
 Kind = Literal["stop", "release", "resume"]
 
 PRESS_OLDEST_S = 60.0
+"""Greatest age of a plausible press (s)."""
 PRESS_AHEAD_S = 0.25
-"""A browser knows our clock to half a round trip; more ahead than this is no error."""
+"""Lead of a plausible press (s): a browser knows our clock to half a round trip."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +45,7 @@ class Press:
     """A page's account of a press; a program may give none.
 
     Attributes:
-        press_id: The same on every transport and at every repetition.
+        press_id: Id of the press, the same at every repetition.
         pressed_at: Unix time by our clock, as the browser knows it (s).
     """
 
@@ -51,14 +54,17 @@ class Press:
 
 
 PLAIN = Press()
+"""A press without an account by its page."""
 
 
 def believe(pressed_at: float | None, at: Instant) -> float | None:
     """The press (Unix s) if plausible: not ahead of ``at`` and not old; else None."""
-    if pressed_at is None:
+    if (
+        pressed_at is None
+        or not -PRESS_AHEAD_S <= at.wall - pressed_at <= PRESS_OLDEST_S
+    ):
         return None
-    if not -PRESS_AHEAD_S <= at.wall - pressed_at <= PRESS_OLDEST_S:
-        return None
+    # A small lead is an error of the browser's clock, and no negative delay.
     return min(pressed_at, at.wall)
 
 
@@ -67,9 +73,11 @@ class Times:
     """Time of each step of a command; all but ``pressed`` on the server's clocks.
 
     Attributes:
+        requested: When the server accepted it.
         pressed: Unix time (s); None where the page sent none, or an impossible one.
-        sent: By transport, when it first took it.
-        answered: By transport, when the robot first said that it has it.
+        sent: Transport → when it first took the message.
+        answered: Transport → when the robot first confirmed it.
+        standing: Begin of the measured standstill.
     """
 
     requested: Instant
@@ -79,7 +87,8 @@ class Times:
     standing: Instant | None = None
 
     def ms_from_press(self, at: Instant) -> float:
-        """From the press, or the acceptance where it is unknown, to a moment (ms)."""
+        """Time from the press, or else from the acceptance, to a moment (ms)."""
+        # The press is on the wall clock; all after it is on the monotonic one.
         lead = 0.0 if self.pressed is None else self.requested.wall - self.pressed
         return max(0.0, 1000.0 * (at.mono - self.requested.mono + lead))
 
@@ -89,13 +98,14 @@ class FollowedCommand:
     """One STOP, RELEASE or RESUME as the operator follows it.
 
     Attributes:
-        reason: Why it began or ended as it did; None for a plain press.
-        standstill_ms: First standing sample − press.
-        tries: How often it was sent before the robot stood; all transports at once
-            count once.
+        requesters: Names of the people who want it, the first first.
+        tries: Number of sends before the robot stood; all transports at once count
+            once.
+        reason: Cause of its begin or end; None for a plain press.
+        standstill_ms: First standing sample − press (ms).
         transports: Each ``pending``, ``ok``, ``failed``, ``unknown`` or ``off``
             (docs/interfaces/resources.md).
-        held_as: The hold of an earlier STOP that this one holds on to.
+        held_as: The hold of an earlier STOP that this one asserts again.
     """
 
     command_id: str
@@ -115,15 +125,21 @@ class FollowedCommand:
         """Id of this STOP's hold at the robot; a release or resume has none."""
         return (self.held_as or self.command_id) if self.kind == "stop" else None
 
+    @property
+    def is_adopted(self) -> bool:
+        """Whether it holds for another server, and nobody here wants this STOP."""
+        return self.requesters == ("iveg",) and self.reason is None
+
     def sent(
         self, transport: Transport, left: Instant, *, ok: bool, doubtful: bool
     ) -> "FollowedCommand":
         """Note that a transport accepted the message, or failed.
 
-        Accepted is not arrived.  The time is when it ``left``: the robot's answer is
-        often here before the transport's, and no answer comes before its question.
+        Acceptance is no arrival.  ``left`` is the time of the message's departure: the
+        robot often answers before the transport does, and its answer must not look
+        earlier.
 
-        Only a broker's PUBACK of a STOP is evidence; Orion's 204 and an order at QoS 0
+        Only a broker's PUBACK of a STOP is evidence.  Orion's 204 and an order at QoS 0
         say nothing until the robot answers.
         """
         times = self.times
@@ -131,23 +147,23 @@ class FollowedCommand:
             times = replace(times, sent={transport.id: left, **times.sent})
         confirms = transport.confirms and self.kind == "stop"
         if self.transports[transport.id] == "ok" and not confirms:
-            # The robot's answer was faster than the transport's.
+            # The robot's answer was faster, and says more.
             return replace(self, times=times)
-        taken = "ok" if confirms else "pending"
-        now = ("unknown" if doubtful else taken) if ok else "failed"
-        return replace(self, times=times, transports=self._with(transport.id, now))
+        accepted = "ok" if confirms else "pending"
+        state = ("unknown" if doubtful else accepted) if ok else "failed"
+        return replace(self, times=times, transports=self._with(transport.id, state))
 
-    def heard_of(self, transport: TransportId, at: Instant) -> "FollowedCommand":
+    def confirmed(self, transport: TransportId, at: Instant) -> "FollowedCommand":
         """Note the robot's confirmation on this transport; the first one counts."""
         if transport in self.times.answered:
             return self
-        answered = {**self.times.answered, transport: at}
-        return replace(self, times=replace(self.times, answered=answered))
+        times = replace(self.times, answered={**self.times.answered, transport: at})
+        return replace(self, times=times)
 
     def answered(self, transport: TransportId, at: Instant) -> "FollowedCommand":
-        """Note the robot's own answer."""
-        heard = self.heard_of(transport, at)
-        return replace(heard, transports=self._with(transport, "ok"))
+        """Note the robot's own answer on this transport."""
+        transports = self._with(transport, "ok")
+        return replace(self.confirmed(transport, at), transports=transports)
 
     def stood(self, first: Instant) -> "FollowedCommand":
         """Note the measured standstill since ``first``; the first one counts."""
@@ -160,12 +176,11 @@ class FollowedCommand:
         )
 
     def ended(self, why: str) -> "FollowedCommand":
-        """The closed command; a release that the robot never confirmed is marked."""
+        """The closed command; ``EXPIRED``: the robot never confirmed the release."""
         if self.kind == "stop":
             return replace(self, state="REPLACED")
-        expired = why == "release_unconfirmed"
-        state: CommandState = "EXPIRED" if expired else "REPLACED"
-        return replace(self, state=state, reason=why)
+        is_expired = why == "release_unconfirmed"
+        return replace(self, state="EXPIRED" if is_expired else "REPLACED", reason=why)
 
     def _with(self, transport: TransportId, state: str) -> dict[TransportId, str]:
         return {**self.transports, transport: state}
@@ -184,14 +199,17 @@ Outcome = Literal[
     "cancelled",
     "deleted",
 ]
-_CLOSED: Mapping[str, Outcome] = {"EXPIRED": "expired", "REPLACED": "replaced"}
-_OF_GOALS: Mapping[str, Outcome] = {
+_OUTCOMES: Mapping[str, Outcome] = {
+    "EXPIRED": "expired",
+    "REPLACED": "replaced",
     "REACHED": "reached",
     "REFUSED": "refused",
     "CANCELLED": "cancelled",
     "DELETED": "deleted",
 }
+"""Outcome of a closed order, or of a goal, by its state."""
 LOUD = frozenset({"UNCONFIRMED", "STILL_MOVING"})
+"""States that call for the red button."""
 
 
 def write_command(command: FollowedCommand) -> CommandRecord:
@@ -204,8 +222,8 @@ def write_command(command: FollowedCommand) -> CommandRecord:
         state=command.state,
         requested_by=command.requesters[0],
         requested_at=times.requested.wall,
-        sent_at={one: at.wall for one, at in times.sent.items()},
-        answer_at={one: at.wall for one, at in times.answered.items()},
+        sent_at={transport: at.wall for transport, at in times.sent.items()},
+        answer_at={transport: at.wall for transport, at in times.answered.items()},
         standing_at=wall_of(times.standing),
         standstill_ms=command.standstill_ms,
         tries=command.tries,
@@ -216,10 +234,10 @@ def write_command(command: FollowedCommand) -> CommandRecord:
 
 def outcome_of(record: CommandRecord) -> Outcome:
     """Outcome of an order; ``open`` while it is followed."""
-    if record.state in _CLOSED:
-        return _CLOSED[record.state]
+    if record.state in _OUTCOMES:
+        return _OUTCOMES[record.state]
     if record.kind == "goal":
-        return _OF_GOALS.get(record.state, "open")
+        return "open"
     if record.kind == "stop":
         if record.state not in ("RUNNING", "READY"):
             return "open"
@@ -232,5 +250,5 @@ def outcome_of(record: CommandRecord) -> Outcome:
 
 
 def was_loud(states: Iterable[str]) -> bool:
-    """Whether it was unconfirmed or not obeyed at any time."""
+    """Whether a STOP was unconfirmed or not obeyed in any of these states."""
     return not LOUD.isdisjoint(states)

@@ -8,17 +8,17 @@
        │            └<── moved, hold lost, release unconfirmed ──┤
        └── READY <────────────── RELEASING <─────────────────────┘
 
-The operator's press is one fact; that the robot stands still is another.  STOP is
-wanted until the robot has reported the release of our own hold, and is sent for so
-long.  A RELEASE is sent once on each transport, for the holds that a person saw;
-unconfirmed it becomes a STOP.
+The operator's press is one fact, the robot's standstill another.  A STOP stays
+wanted, and is repeated, until the robot has reported the release of our own hold.  A
+RELEASE is sent once on each transport, for the holds that a person saw; if the robot
+does not confirm it, it becomes a STOP.
 
-What happens comes in by a method, from people, transports, the robot or time.  The
-method finds out which event that is (after the guard that may refuse an order) and the
-table at the end, ``STEPS``, says what follows.  An event without a row is a mistake in
-this module: nothing changes, ``OffTable`` reports it, and STOP is sent on.
+Every input has a method: people, transports, the robot, time.  The method asks the
+guard that may refuse an order, and names the event.  The table at the end, ``STEPS``,
+says what follows.  An event without a row is a mistake in this module: nothing changes,
+``OffTable`` reports it, and STOP is repeated as before.
 
-Alert conditions of the STOPs of a fleet.
+Last come the alert conditions of all STOPs of a fleet.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -40,22 +40,22 @@ from iveg.domain.stop.status import (
     SendOnce,
     SetDesiredState,
     StopStatus,
-    drives,
+    is_held,
+    may_drive,
 )
 from iveg.domain.transports import TRANSPORTS, Transport, TransportId
 
-_UNHEARD: tuple[State, ...] = ("REQUESTED", "SENT", "UNCONFIRMED")
+_UNDELIVERED: tuple[State, ...] = ("REQUESTED", "SENT", "UNCONFIRMED")
 
 
 class StopMachine(StopStatus):
     """One robot's STOP.
 
-    Everything that can happen to it is a method; each returns what the world is asked
-    to do, in this order.
+    Each method takes one input and returns the effects, to be carried out in order.
 
     Args:
-        robot_id: Whose.
-        transports: The ways to it.
+        robot_id: The robot.
+        transports: All transports to it.
         steps: The table; a test takes rows away.
     """
 
@@ -74,44 +74,50 @@ class StopMachine(StopStatus):
         self, by: str, at: Instant, new_id: str, *, press: Press = PLAIN
     ) -> list[Effect]:
         """STOP: always accepted; a press during an episode joins it."""
+        # A RELEASE under way may still lift the present hold: begin an episode.
         if not self.wants_stop or self.state == "RELEASING":
             return self._stop_again("requested", at, new_id, by, press)
         self._joined_at = at.mono
         effects: list[Effect] = []
         if self.state != "STANDING":
-            self._sends.now(at)
+            self._timetable.now(at)
             effects = self._send_due(at)
         if self.stop is None or by in self.stop.requesters:
             return effects
-        # One more person wants it: nothing changes but the audit.
+        # One more person wants the STOP: nothing changes but the audit.
         self.stop = replace(self.stop, requesters=(*self.stop.requesters, by))
-        return [*effects, self._changed("requested", self.stop, f"joined by {by}")]
+        return [*effects, self._changed("requested", f"joined by {by}")]
 
     def restore(self, wanted: DesiredRecord, at: Instant, new_id: str) -> list[Effect]:
         """STOP again a robot that an earlier run had stopped."""
-        kept = wanted.hold_to_assert()
-        return self._step(Event("reasserted", at, new_id, wanted.by, kept=kept))
+        return self._step(
+            Event("reasserted", at, new_id, wanted.by, kept=wanted.hold_to_assert())
+        )
 
     def release(
         self, by: str, seen: Iterable[str], at: Instant, new_id: str
     ) -> list[Effect]:
-        """Lift exactly the holds that a person saw. Raises likewise."""
+        """Send a RELEASE of exactly the holds that a person saw.
+
+        Raises:
+            CommandRefusedError: it must not happen now (I2).
+        """
         challenge, remote = self.evidence.check_release(
             self.state, at, seen, self._joined_at
         )
-        return self._order(Event("releasing", at, new_id, by), challenge, remote)
+        return self._begin_order(Event("releasing", at, new_id, by), challenge, remote)
 
     def resume(self, by: str, at: Instant, new_id: str) -> list[Effect]:
-        """Let a released robot drive. Raises likewise."""
+        """Let a released robot drive; raises like ``release``."""
         challenge = self.evidence.check_resume(self.state, at)
-        return self._order(Event("resuming", at, new_id, by), challenge)
+        return self._begin_order(Event("resuming", at, new_id, by), challenge)
 
-    def _order(
+    def _begin_order(
         self, event: Event, challenge: str, ids: tuple[str, ...] = ()
     ) -> list[Effect]:
-        # Refused, a robot that iVeg has not stopped is what it was before: running.
+        # After a refusal a robot that iVeg has not stopped is RUNNING again.
         before: State = "RUNNING" if self.stop is None else self.state
-        command = event.begins(self.robot_id, self._transports.values())
+        command = event.new_command(self.robot_id, self._transports.values())
         attempt = Attempt(command, challenge, ids, before)
         return self._step(replace(event, attempt=attempt))
 
@@ -125,20 +131,27 @@ class StopMachine(StopStatus):
         *,
         ok: bool,
         doubtful: bool = False,
-        left: Instant | None = None,
+        handed_over: Instant | None = None,
     ) -> list[Effect]:
-        """A transport took our message (PUBACK, 2xx) or failed; neither is evidence.
+        """Note that a transport took our message (PUBACK, 2xx) or failed.
 
-        ``doubtful``: what lies behind is known to pass nothing on.  ``left``: when it
-        was handed to the transport; this moment if None.
+        Neither proves that the robot has the message.
+
+        Args:
+            transport: The transport.
+            command_id: The command that was sent.
+            at: When the transport answered.
+            ok: Whether the transport took the message.
+            doubtful: Whether the next hop is known to pass nothing on.
+            handed_over: When the transport got the message; None: at ``at``.
         """
         command = self._find(command_id)
         if command is None:
-            return []  # Its episode has ended meanwhile.
+            return []  # The command's episode has ended meanwhile.
         if command.kind == "stop":
-            self._sends.came_back(transport, at)
+            self._timetable.came_back(transport, at)
         way = self._transports[transport]
-        self._keep(command.sent(way, left or at, ok=ok, doubtful=doubtful))
+        self._keep(command.sent(way, handed_over or at, ok=ok, doubtful=doubtful))
         if not ok or doubtful or self.state != "REQUESTED":
             return []
         return self._step(Event("sent", at))
@@ -153,16 +166,17 @@ class StopMachine(StopStatus):
             if answer.attempt != self.attempt.command.command_id:
                 return []
             self.attempt = self.attempt.answered(answer, transport, at)
-            # Its report may have come before the answer.
+            # The deciding report may have come before this answer.
             decided = self.attempt.is_refused(self.evidence.report, self.hold_id)
-            refused = answer.result == "REFUSED" and decided
-            return self._step(Event("refused", at)) if refused else []
-        if self.wants_stop and answer.result == "RELEASED":
-            # It will never hold by that name again: only a new one can.
-            is_ours = answer.id == self.hold_id
-            return self._lifted(at, new_id, is_ours) if is_ours else []
-        held = {answer.id, *(hold.id for hold in answer.holds)}
-        if self.stop is None or answer.result != "LATCHED" or self.hold_id not in held:
+            if answer.result == "REFUSED" and decided:
+                return self._step(Event("refused", at))
+            return []
+        is_ours = answer.id == self.hold_id
+        if self.wants_stop and answer.result == "RELEASED" and is_ours:
+            # A robot never takes a released id again, so the STOP needs a new one.
+            return self._hold_lost(at, new_id, is_released=True)
+        ids = {answer.id, *(hold.id for hold in answer.holds)}
+        if self.stop is None or answer.result != "LATCHED" or self.hold_id not in ids:
             return []
         self.stop = self.stop.answered(transport, at)
         return self._delivered(at)
@@ -177,34 +191,40 @@ class StopMachine(StopStatus):
         *,
         sparse: bool = False,
     ) -> list[Effect]:
-        """Take the robot's safety report, new by (boot, seq), ``age_s`` old at most.
+        """Take the robot's newest safety report by (boot, seq).
 
-        ``sparse``: it came on a topic that has two of them a second, not ten.
+        Args:
+            report: The report.
+            at: When it came.
+            transport: The transport that brought it.
+            new_id: Id of the STOP that may begin.
+            age_s: Its greatest age when it came (s).
+            sparse: Whether its topic has two reports a second, not ten.
         """
         if not self.evidence.note_report(report, at, age_s, self.hold_id):
             return []
+        # An older report may show the robot before this episode.
         is_later = at.mono - age_s >= self._begun_at
-        if self.state == "READY" and drives(report) and is_later:
-            return self._step(Event("running", at))
         if self.state in ("RUNNING", "READY"):
-            # A hold that this process did not ask for is not dropped while it is news.
-            ours = self.evidence.ours[-1:] if age_s <= LIMITS.report_stale_s else []
-            return self._step(Event("adopted", at, ours[0])) if ours else []
+            return self._reported_free(report, at, is_later=is_later)
         if self.attempt is not None:
             verdict = self.attempt.verdict(report, self.hold_id)
             return [] if verdict is None else self._step(Event(verdict, at))
         assert self.stop is not None  # noqa: S101 - every such state has an episode
         has_stood = self.state in ("STANDING", "STALE")
-        if self.hold_id not in {hold.id for hold in report.holds}:
+        if not is_held(report, self.hold_id):
             self.evidence.standstill.forget()
             is_released = self.hold_id in report.released
+            # Before it stood, the report may have left before the STOP arrived.
             if not is_later or not (has_stood or is_released):
                 return []
-            is_driving = drives(report)
-            return self._lifted(at, new_id, is_released, is_driving=is_driving)
-        if report.challenge != self._doubt:
-            self._doubt = None
-        self.stop = self.stop.heard_of(transport, at)
+            return self._hold_lost(
+                at, new_id, is_released=is_released, is_free=may_drive(report)
+            )
+        # With another challenge no copy of the release can lift our hold any more.
+        if report.challenge != self._open_challenge:
+            self._open_challenge = None
+        self.stop = self.stop.confirmed(transport, at)
         effects = self._delivered(at)
         match self.evidence.motion(report, at, sparse=sparse):
             case "moves" if has_stood:
@@ -213,69 +233,83 @@ class StopMachine(StopStatus):
                 effects += self._step(Event("standing", at))
         return effects
 
+    def _reported_free(
+        self, report: SafetyReport, at: Instant, *, is_later: bool
+    ) -> list[Effect]:
+        """Take the report of a robot that iVeg does not hold."""
+        if self.state == "READY" and may_drive(report) and is_later:
+            return self._step(Event("running", at))
+        own_holds = self.evidence.ours
+        # An older report may name a hold of an earlier boot, long lifted.
+        if own_holds and self.evidence.evidence_age(at) <= LIMITS.report_stale_s:
+            return self._step(Event("adopted", at, own_holds[-1]))
+        return []
+
     def odometry(
         self,
-        said: Odometry,
+        odometry: Odometry,
         at: Instant,
         new_id: str,
         age_s: float,
         motion: Motion = UNMOVED,
     ) -> list[Effect]:
-        """Take odometry, proven to be no older than ``age_s``.
+        """Take odometry, proven to be at most ``age_s`` old.
 
-        ``motion``: of the robot by all that is known.
+        ``motion``: Motion of the robot by all its sources.
         """
-        contradicted = self.evidence.is_contradicted(said, motion, at, age_s)
-        moved = contradicted and self.state == "STANDING"
-        return self._stop_again("moved", at, new_id) if moved else []
+        contradicted = self.evidence.is_contradicted(odometry, motion, at, age_s)
+        if contradicted and self.state == "STANDING":
+            return self._stop_again("moved", at, new_id)
+        return []
 
     def _delivered(self, at: Instant) -> list[Effect]:
-        return self._step(Event("delivered", at)) if self.state in _UNHEARD else []
+        return self._step(Event("delivered", at)) if self.state in _UNDELIVERED else []
 
-    def _lifted(
-        self, at: Instant, new_id: str, is_released: bool, *, is_driving: bool = False
+    def _hold_lost(
+        self, at: Instant, new_id: str, *, is_released: bool, is_free: bool = False
     ) -> list[Effect]:
-        """The hold is lost without a release of ours: STOP again.
+        """STOP again: the hold is lost without a RELEASE of ours.
 
-        One that was adopted, and that nobody here asked for, is another server's: the
-        robot's word that it was released ends it.
+        An adopted hold belongs to another server.  The robot's report of its release
+        ends it.
         """
-        stop = self.stop
-        if is_released and stop and (*stop.requesters, stop.reason) == ("iveg", None):
+        if is_released and self.stop is not None and self.stop.is_adopted:
             effects = self._step(Event("ready", at))
-            return effects + self._step(Event("running", at)) if is_driving else effects
-        lost: Key = "moved" if self._doubt is None else "release_unconfirmed"
-        return self._stop_again(lost, at, new_id)
+            return effects + self._step(Event("running", at)) if is_free else effects
+        key: Key = "moved" if self._open_challenge is None else "release_unconfirmed"
+        return self._stop_again(key, at, new_id)
 
     # --- time ---------------------------------------------------------------------
 
     def tick(self, now: Instant, new_id: str) -> list[Effect]:
-        """Let time pass: deadlines first, then what must be sent again."""
+        """Let time pass: deadlines first, then repetitions that are due."""
         effects = self._overdue(now, new_id)
-        if not self.wants_stop or (self.state == "RELEASING" and not self._is_lost):
+        # Beside a RELEASE no STOP goes out, unless an event had no row in the table.
+        if not self.wants_stop or (self.state == "RELEASING" and not self._had_no_row):
             return effects
         return [*effects, *self._send_due(now)]
 
     def _overdue(self, now: Instant, new_id: str) -> list[Effect]:
-        late = now.mono >= self._deadline
-        if self._is_doubtful(now):
+        is_late = now.mono >= self._deadline
+        # A late RELEASE may have lifted the hold, and no report shows it: hold anew.
+        if self._is_hold_doubtful(now):
             return self._step(Event("release_unconfirmed", now, new_id))
         match self.state:
-            case "REQUESTED" | "SENT" if late:
+            case "REQUESTED" | "SENT" if is_late:
                 return self._step(Event("unconfirmed", now))
-            case "DELIVERED" if late:
+            case "DELIVERED" if is_late:
                 return self._step(Event("still_moving", now))
             case "STANDING" if self.evidence.evidence_age(now) > LIMITS.report_stale_s:
                 return self._step(Event("stale", now))
-            case "RELEASING" if late:
-                # Nothing decided it in time: it becomes a STOP (I7).
+            case "RELEASING" if is_late:
+                # No report decided the order in time: it becomes a STOP (I7).
                 return self._stop_again("release_unconfirmed", now, new_id)
         return []
 
     def _stop_again(
         self, key: Key, at: Instant, new_id: str, by: str = "iveg", press: Press = PLAIN
     ) -> list[Effect]:
-        """A new episode of a robot that may be held already."""
+        """Begin a new episode of a robot that may be held already."""
         kept = self._hold_to_keep(at, expired=key == "release_unconfirmed")
         return self._step(Event(key, at, new_id, by, press, kept))
 
@@ -284,47 +318,50 @@ class StopMachine(StopStatus):
     def _step(self, event: Event) -> list[Effect]:
         """Carry out the step of the table, or report that there is none."""
         step = self._steps.get((self.state, event.key))
-        self._is_lost = step is None
+        self._had_no_row = step is None
         if step is None:
             return [OffTable(self.robot_id, self.state, event.key)]
         attempt = self.attempt
         before: State = "RUNNING" if attempt is None else attempt.before
         self.state = step.to or before
-        effects = step.do(self, event)
+        effects = [] if step.action is None else step.action(self, event)
         for command in self.commands:
             self._keep(replace(command, state=self.state))
-        why = attempt.refused if attempt and event.key == "refused" else None
-        effects = [*effects, self._changed(event.key, self.once or self.stop, why)]
+        reason = attempt.refused if attempt and event.key == "refused" else None
+        effects = [*effects, self._changed(event.key, reason)]
+        # The effects above still show the commands that end here.
         self.attempt = self.attempt if step.ends == "nothing" else None
         self.stop = None if step.ends == "all" else self.stop
         return effects
 
-    # --- what the steps do --------------------------------------------------------
+    # --- actions of the steps -----------------------------------------------------
 
     def _begin(self, event: Event) -> list[Effect]:
-        """A new episode, under an id that was never used before."""
-        opened = self._new_episode(event, LIMITS.unconfirmed_after_s)
-        return [*self._send_due(event.at), *opened]
+        """Begin an episode, under an id that was never used before."""
+        effects = self._new_episode(event, LIMITS.unconfirmed_after_s)
+        # The sends come first: nothing delays the first byte of a STOP (I5).
+        return [*self._send_due(event.at), *effects]
 
     def _adopt(self, event: Event) -> list[Effect]:
-        """A hold of iVeg that this process did not ask for is taken over."""
+        """Take over a hold of iVeg that another process made."""
         return self._new_episode(event, LIMITS.braking_most_s)
 
     def _new_episode(self, event: Event, within_s: float) -> list[Effect]:
-        closed = self._closed_by(event.key)
-        self.stop = event.begins(self.robot_id, self._transports.values())
-        self.attempt, self._doubt = None, event.kept.challenge
+        # First, since the new commands below replace those that end.
+        closing = self._closed_by(event.key)
+        self.stop = event.new_command(self.robot_id, self._transports.values())
+        self.attempt, self._open_challenge = None, event.kept.challenge
         self._begun_at, self._deadline = event.at.mono, event.at.mono + within_s
         self.evidence.standstill.forget()
-        self._sends.begin(event.at)
+        self._timetable.begin(event.at)
         hold_id = event.kept.hold_id or event.new_id
-        return [SetDesiredState(self.robot_id, "stopped", (hold_id,)), *closed]
+        return [SetDesiredState(self.robot_id, "stopped", (hold_id,)), *closing]
 
     def _allow_braking(self, event: Event) -> list[Effect]:
         braking = (
             self.evidence.speed / LIMITS.least_braking_m_s2 + LIMITS.braking_extra_s
         )
-        # From the robot's word on: before it, a robot out of reach could not brake.
+        # Braking begins when the robot has the STOP; out of reach it could not brake.
         self._deadline = event.at.mono + min(braking, LIMITS.braking_most_s)
         return []
 
@@ -333,36 +370,34 @@ class StopMachine(StopStatus):
             self.stop = self.stop.stood(self.evidence.standstill.since or event.at)
         return []
 
-    def _ask_at_once(self, _: Event) -> list[Effect]:
+    def _repeat_at_once(self, _: Event) -> list[Effect]:
         self.evidence.standstill.forget()
-        self._sends.repeat_now()
+        self._timetable.repeat_now()
         return []
 
     def _send_once(self, event: Event) -> list[Effect]:
         self.attempt = event.attempt
-        assert self.attempt is not None  # noqa: S101 - whoever orders makes one
+        assert self.attempt is not None  # noqa: S101 - _begin_order sets it
         self._deadline = event.at.mono + LIMITS.release_within_s
         named = self.attempt.ids
-        return [
-            SendOnce(
-                self.attempt, tuple(one for one in self.evidence.ours if one in named)
-            )
-        ]
+        own_holds = tuple(hold for hold in self.evidence.ours if hold in named)
+        return [SendOnce(self.attempt, own_holds)]
 
-    def _say_why(self, _: Event) -> list[Effect]:
+    def _note_refusal(self, _: Event) -> list[Effect]:
         if self.attempt is not None:
             self._keep(replace(self.attempt.command, reason=self.attempt.refused))
         return []
 
-    def _let_go(self, _: Event) -> list[Effect]:
+    def _publish_run(self, _: Event) -> list[Effect]:
         return [SetDesiredState(self.robot_id, "run", ())]
 
     def _send_due(self, at: Instant) -> list[Effect]:
         assert self.stop is not None  # noqa: S101 - callers have begun an episode
-        due = self._sends.due(self.stop, at)
-        if due and self.state != "STANDING":
+        sends = self._timetable.due(self.stop, at)
+        # Repetitions to a standing robot are upkeep, not tries.
+        if sends and self.state != "STANDING":
             self.stop = replace(self.stop, tries=self.stop.tries + 1)
-        return [*due]
+        return [*sends]
 
 
 @dataclass(frozen=True, slots=True)
@@ -370,37 +405,41 @@ class Step:
     """The transition of an event.
 
     Attributes:
-        to: The new state; None is the one that the attempt began in.
-        do: What changes, and what the world is asked to do besides telling of it.
-        ends: What is over after that: nothing, the release or resume, or all.
+        to: The new state; None: the state in which the release or resume began.
+        action: Changes the machine and returns the effects, but for ``Changed``;
+            None: there are none.
+        ends: Commands that end with the event: none, the release or resume, or all.
     """
 
     to: State | None
-    do: Callable[[StopMachine, Event], list[Effect]] = lambda _machine, _event: []
+    action: Callable[[StopMachine, Event], list[Effect]] | None = None
     ends: Literal["nothing", "order", "all"] = "nothing"
 
 
 def _rows() -> Iterable[tuple[Key, tuple[State, ...], Step]]:
-    """One row an event: its states of origin and its transition."""
-    m, every = StopMachine, get_args(State)
-    begin, order = Step("REQUESTED", m._begin), Step("RELEASING", m._send_once)
-    yield "requested", every, begin
-    yield "reasserted", every, begin
-    yield "moved", every, begin
-    yield "release_unconfirmed", every, begin
+    """Rows of the table: event, states in which it may come, transition."""
+    machine, any_state = StopMachine, get_args(State)
+    stop = Step("REQUESTED", machine._begin)
+    order = Step("RELEASING", machine._send_once)
+    yield "requested", any_state, stop
+    yield "reasserted", any_state, stop
+    yield "moved", any_state, stop
+    yield "release_unconfirmed", any_state, stop
     yield "sent", ("REQUESTED",), Step("SENT")
-    yield "delivered", _UNHEARD, Step("DELIVERED", m._allow_braking)
+    yield "delivered", _UNDELIVERED, Step("DELIVERED", machine._allow_braking)
     yield "unconfirmed", ("REQUESTED", "SENT"), Step("UNCONFIRMED")
     yield "still_moving", ("DELIVERED",), Step("STILL_MOVING")
     moving: tuple[State, ...] = ("DELIVERED", "STILL_MOVING", "STALE")
-    yield "standing", moving, Step("STANDING", m._note_standstill)
-    yield "stale", ("STANDING",), Step("STALE", m._ask_at_once)
+    yield "standing", moving, Step("STANDING", machine._note_standstill)
+    yield "stale", ("STANDING",), Step("STALE", machine._repeat_at_once)
+    # RUNNING: iVeg has not stopped it, but its boot may hold it.
     yield "releasing", ("STANDING", "RUNNING"), order
     yield "resuming", ("READY", "RUNNING"), order
-    yield "refused", ("RELEASING",), Step(None, m._say_why, "order")
-    yield "ready", ("RELEASING", "STANDING", *moving), Step("READY", m._let_go, "order")
+    yield "refused", ("RELEASING",), Step(None, machine._note_refusal, "order")
+    ready = Step("READY", machine._publish_run, "order")
+    yield "ready", ("RELEASING", "STANDING", *moving), ready
     yield "running", ("RELEASING", "READY"), Step("RUNNING", ends="all")
-    yield "adopted", ("RUNNING", "READY"), Step("DELIVERED", m._adopt)
+    yield "adopted", ("RUNNING", "READY"), Step("DELIVERED", machine._adopt)
 
 
 STEPS: Mapping[tuple[State, Key], Step] = {
@@ -413,10 +452,12 @@ _ALERTS = {
     "STILL_MOVING": "alert.stop_still_moving",
 }
 _NOT_AT_REST = {"REQUESTED", "SENT", "DELIVERED", *_ALERTS}
-"""A STOP in one of these has not been seen to stand, not even once."""
+"""States of an episode in which the robot has not stood yet."""
 
 
-def of_machines(machines: Iterable[StopMachine], now: Instant) -> Iterable[Condition]:
+def stop_conditions(
+    machines: Iterable[StopMachine], now: Instant
+) -> Iterable[Condition]:
     """Conditions of STOPs that are not confirmed or not obeyed."""
     for machine in machines:
         stop, robot_id = machine.stop, machine.robot_id

@@ -1,15 +1,28 @@
-"""Orders to one robot and what is kept of its STOP, before the table decides.
+"""Orders to one robot and the state of its STOP, before the table decides.
 
 In this order: the desired state on disk (I1), an attempt to release or resume (I2, I6),
 events and effects of the machine, the timetable of repetitions (I4), and the state that
 ``machine.StopMachine`` changes.
 
-An order carries a challenge that the robot spends on the first copy, whatever it makes
-of it.  So a newer report with another challenge says that no copy can act any more:
-what it shows has come to stay.  The copies go out once on each transport and come in
-any order, late, or not at all.  The robot's reports decide, not its answers: one that
-shows the release makes it true, and a refusal counts once a report shows that the
-challenge is spent.
+A RELEASE or RESUME carries a challenge.  The robot spends it on the first copy, whether
+it obeys or refuses.  So a newer report with another challenge proves that no copy can
+act any more.  One copy goes out on each transport; they arrive in any order, late, or
+not at all.  The robot's reports decide, not its answers.  A report that shows the
+release confirms it; a refusal counts once a report shows that the challenge is spent.
+
+A robot takes no released id again, and gets no more holds than it may have.  So the
+hold that the next STOP asserts depends on the release that names it::
+
+    release                holds reported    next STOP           after a restart
+    none                   not the most      a new hold          the same hold
+    none                   the most          a reported hold     the same hold
+    may still act          not the most      a new hold          a new hold
+    may still act          the most          a reported hold *   the same hold *
+    expired and spent      any               a reported hold     unknown: as above
+
+    *  with the challenge: until a report shows another, or none comes for a second
+
+A spent release that has not expired counts as none.
 """
 
 from collections.abc import Iterable, Mapping
@@ -35,11 +48,11 @@ from iveg.domain.transports import Transport, TransportId
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """An existing hold of the robot that a new STOP asserts again.
+    """Existing hold of the robot that a new STOP asserts again.
 
     Attributes:
-        hold_id: None: the STOP is a new hold.
-        challenge: Of a release that may still lift it.
+        hold_id: Its id; None: the STOP is a new hold.
+        challenge: Challenge of a release that may still lift it; None: there is none.
     """
 
     hold_id: str | None = None
@@ -51,34 +64,33 @@ NEW_HOLD = Kept()
 
 @dataclass(frozen=True, slots=True)
 class DesiredRecord:
-    """The stored desire that a robot stands.
+    """Stored order that a robot stands.
 
     Attributes:
-        by: The person who asked.
+        by: The person who pressed STOP.
         hold_id: The hold of that STOP; None where the disk does not know whether a
             release has named it.
-        named: Holds that any release ever named, the last 64, newest last.
-        asked: STOPs that the newest release named, if nothing has confirmed it.
-        challenge: The challenge which that release carried.
+        named: The last 64 holds that any release named, newest last.
+        open_release: STOPs that the newest release names, until it is confirmed.
+        challenge: Challenge of that release.
     """
 
     by: str
     hold_id: str | None = None
     named: tuple[str, ...] = ()
-    asked: tuple[str, ...] = ()
+    open_release: tuple[str, ...] = ()
     challenge: str | None = None
 
     def hold_to_assert(self) -> Kept:
         """The hold that a STOP after a restart asserts again.
 
-        A hold that no release ever named cannot have been lifted, so asserting it again
-        adds none.  One that was named may have been: the robot would answer RELEASED
-        and hold nothing, so the hold is a new one; unless there are so many that
-        theirs is asserted until the robot's word, or its silence, decides.
+        By the table in the module's head.  A hold that no release ever named cannot
+        have been lifted: asserted again, it adds none.  For a named hold the robot may
+        answer RELEASED and hold nothing.
         """
         if self.hold_id in self.named:
-            many = len(self.asked) >= LIMITS.most_holds
-            return Kept(self.hold_id, self.challenge) if many else NEW_HOLD
+            is_full = len(self.open_release) >= LIMITS.most_holds
+            return Kept(self.hold_id, self.challenge) if is_full else NEW_HOLD
         return Kept(self.hold_id)
 
 
@@ -87,10 +99,11 @@ class Attempt:
     """A release or resume that was sent and not yet decided.
 
     Attributes:
-        challenge: That of the report that a person saw.
-        ids: What a release lifts; none in a resume.
-        before: The state that it began in, and goes back to if it is refused.
-        refused: Why one of its copies was refused.
+        command: The release or resume.
+        challenge: Challenge of the report that a person saw.
+        ids: Holds that a release lifts; none in a resume.
+        before: State in which it began; a refusal leads back to it.
+        refused: Reason of a copy's refusal; None: no copy was refused.
     """
 
     command: FollowedCommand
@@ -102,57 +115,51 @@ class Attempt:
     def is_spent(self, report: SafetyReport | None) -> bool:
         """Whether no copy can act any more.
 
-        Args:
-            report: The robot's newest, by (boot, seq): not older than the one that the
-                order was made from.
+        ``report``: The robot's newest by (boot, seq), so at least as new as the one
+        with the challenge.
         """
         return report is not None and report.challenge != self.challenge
 
     def answered(
         self, answer: CommandAnswer, transport: TransportId, at: Instant
     ) -> "Attempt":
-        """The robot answers a copy."""
+        """Note the robot's answer to a copy."""
+        is_refused = answer.result == "REFUSED"
+        reason = (answer.why or "refused") if is_refused else self.refused
         command = self.command.answered(transport, at)
-        refused = self.refused
-        if answer.result == "REFUSED":
-            refused = answer.why or "refused"
-        return replace(self, command=command, refused=refused)
+        return replace(self, command=command, refused=reason)
 
     def verdict(
         self, report: SafetyReport, hold_id: str | None
     ) -> Literal["running", "ready", "refused"] | None:
-        """Decision of a report on it; None where it decides nothing.
+        """Verdict by the robot's newest report; None: the report decides nothing.
 
-        Args:
-            report: The robot's newest.
-            hold_id: Our hold; None where iVeg has not stopped the robot.
+        ``hold_id``: Our hold; None where iVeg has not stopped the robot.
         """
-        if self.command.kind == "resume" and drives(report):
+        # A report that shows the effect confirms it, whichever copy acted.
+        if self.command.kind == "resume" and may_drive(report):
             return "running"
         is_named = hold_id is None or hold_id in report.released
-        if (
-            self.command.kind == "release"
-            and is_named
-            and not _is_held(report, hold_id)
-        ):
+        if self.command.kind == "release" and is_named and not is_held(report, hold_id):
             return "ready"
         return "refused" if self.is_refused(report, hold_id) else None
 
     def is_refused(self, report: SafetyReport | None, hold_id: str | None) -> bool:
-        """Whether one copy was refused and none can act any more; args likewise."""
+        """Whether a copy was refused and none can act any more; arguments as above."""
         if self.refused is None or not self.is_spent(report):
             return False
+        # Another copy of a release may have succeeded: then it is no longer held.
         is_resume = self.command.kind == "resume"
-        return is_resume or (report is not None and _is_held(report, hold_id))
+        return is_resume or (report is not None and is_held(report, hold_id))
 
 
-def drives(report: SafetyReport) -> bool:
+def may_drive(report: SafetyReport) -> bool:
     """Whether a robot reports that it is free to drive."""
     return not report.holds and report.speed_factor > 0
 
 
-def _is_held(report: SafetyReport, hold_id: str | None) -> bool:
-    """Whether our hold stands, or any that iVeg may lift where it has none."""
+def is_held(report: SafetyReport, hold_id: str | None) -> bool:
+    """Whether our hold is in force; without one, whether iVeg could lift any."""
     if hold_id is None:
         return any(hold.ack == "remote" for hold in report.holds)
     return hold_id in {hold.id for hold in report.holds}
@@ -185,10 +192,12 @@ class Event:
     """An event, with the arguments of its step.
 
     Attributes:
-        new_id: Names the command that begins, and its hold unless one is ``kept``.
+        key: Kind of the event.
+        at: Time of the event.
+        new_id: Id of the command that begins; also of its hold, unless one is kept.
         by: The person who wants it.
         press: The page's account of a press.
-        kept: The hold that a STOP holds on to.
+        kept: Existing hold that the STOP asserts again.
         attempt: The release or resume that begins.
     """
 
@@ -200,15 +209,18 @@ class Event:
     kept: Kept = NEW_HOLD
     attempt: Attempt | None = None
 
-    def begins(self, robot_id: str, transports: Iterable[Transport]) -> FollowedCommand:
-        """The command that begins with it; ``off`` on transports that cannot carry it.
+    def new_command(
+        self, robot_id: str, transports: Iterable[Transport]
+    ) -> FollowedCommand:
+        """New command of the event; ``off`` on transports that cannot carry it.
 
-        A release or resume is sent once, at once; a STOP as often as it takes.
+        A release or resume is sent once; a STOP is repeated, and counts its tries.
         """
         kind = _ORDERS.get(self.key, "stop")
         is_stop = kind == "stop"
-        plain = not is_stop or self.key in ("requested", "adopted")
-        ways = {
+        # A press and an adoption explain themselves; any other cause is shown.
+        is_plain = not is_stop or self.key in ("requested", "adopted")
+        states = {
             transport.id: "pending" if transport.carries(kind) else "off"
             for transport in transports
         }
@@ -220,8 +232,8 @@ class Event:
             Times(self.at, believe(self.press.pressed_at, self.at)),
             requesters=(self.by,),
             tries=0 if is_stop else 1,
-            reason=None if plain else self.key,
-            transports=ways,
+            reason=None if is_plain else self.key,
+            transports=states,
             held_as=self.kept.hold_id,
         )
 
@@ -241,7 +253,8 @@ class SendOnce:
     """Send a release or a resume, once on each transport.
 
     Attributes:
-        ours: Those of its holds that are STOPs of iVeg.
+        attempt: The release or resume.
+        ours: Holds in it that are STOPs of iVeg.
     """
 
     attempt: Attempt
@@ -250,7 +263,7 @@ class SendOnce:
 
 @dataclass(frozen=True, slots=True)
 class SetDesiredState:
-    """Publish the retained desired state that a reconnecting robot finds."""
+    """Publish the retained desired state, for a robot that connects again."""
 
     robot_id: str
     desired: Literal["stopped", "run"]
@@ -262,9 +275,10 @@ class Changed:
     """The state changed: one audit row, one log line.
 
     Attributes:
-        command_id: Whose step it is.
-        key: Names the sentence, such as ``standing`` or ``moved``.
-        commands: The STOP and the order under way, as they are after it.
+        command_id: The command that the step belongs to.
+        key: Key of the log sentence, such as ``standing`` or ``moved``.
+        why: Reason of a refusal, or who joined.
+        commands: The STOP and the order under way, after the step.
     """
 
     command_id: str
@@ -279,7 +293,7 @@ class Closed:
     """A command that is no longer followed: its last audit row, and no log line.
 
     Attributes:
-        key: What closed it; its sentence stands at the command that came.
+        key: Event that closed it; its sentence stands at the command that came.
     """
 
     command: FollowedCommand
@@ -290,7 +304,7 @@ class Closed:
 class OffTable:
     """An event without a row in this state: a mistake in the machine.
 
-    Nothing has changed, and the desired state stays.
+    No state changes, and the desired state stays.
     """
 
     robot_id: str
@@ -308,84 +322,91 @@ _PAUSE_S: Mapping[str, float] = {
     "STILL_MOVING": 1.0,
     "STANDING": STANDING_RESEND_S,
 }
-"""Between two sends to a robot that has it; to every other ``_pause`` by its age."""
+"""Pause between two sends to a robot that has the STOP, by state (s)."""
 _EARLY_S = 1e-3
-"""Clocks that tick in fractions meet a planned moment only nearly."""
+"""Tolerance of a planned moment, since clocks tick in fractions (s)."""
 
 
-class Sends:
-    """Timetable of one robot's STOP.
+class Timetable:
+    """Times at which the STOP of one robot is sent and repeated.
 
-    A transport that takes any number: at 0, 250, 500 and 1000 ms, then every half
-    second, after ten seconds every second; to a robot that has it every second, to a
-    standing one every five.  One that takes one at a time (Orion): the next two seconds
-    after the last came back, and none to a robot that has it, unless there is no other
-    transport.
+    A direct transport sends at 0, 250, 500 and 1000 ms, then every half second, after
+    ten seconds every second.  To a robot that has the STOP it sends every second, to a
+    standing robot every five.
+
+    A serial transport (Orion) takes the next message two seconds after the last came
+    back.  It sends none to a robot that has the STOP, unless all transports are serial.
     """
 
     def __init__(self, transports: Iterable[Transport]) -> None:
-        self._ways = {way.id: way for way in transports if way.can_stop}
-        self._is_alone = all(way.one_at_a_time for way in self._ways.values())
+        self._transports = {
+            transport.id: transport for transport in transports if transport.can_stop
+        }
+        self._all_serial = all(
+            transport.is_serial for transport in self._transports.values()
+        )
         self._sent: dict[TransportId, tuple[float, float]] = {}
-        """When a STOP was last sent (monotonic, s), and how old it was then (s)."""
+        """Time of the last send (monotonic, s), and the STOP's age then (s)."""
         self._busy: set[TransportId] = set()
-        """Transports of one at a time with a request under way."""
+        """Serial transports with a request under way."""
         self._next: dict[TransportId, float] = {}
-        """When those may be asked again (monotonic, s)."""
+        """Earliest next request on a serial transport (monotonic, s)."""
 
     def begin(self, at: Instant) -> None:
-        """A new episode, on all at once; what is under way is of an earlier one."""
+        """Begin an episode on all transports at once."""
+        # Requests under way belong to an earlier episode, so they hold up none.
         self._busy.clear()
         self.now(at)
 
     def now(self, at: Instant) -> None:
         """Make every transport due now."""
         self._sent.clear()
-        self._next = dict.fromkeys(self._ways, at.mono)
+        self._next = dict.fromkeys(self._transports, at.mono)
 
     def repeat_now(self) -> None:
-        """Make those that take any number due at the next check."""
+        """Make all but serial transports due at the next check."""
         self._sent.clear()
 
     def came_back(self, transport: TransportId, at: Instant) -> None:
-        """Note that a transport's request has ended."""
+        """Note that a request on this transport has ended."""
         self._busy.discard(transport)
         self._next[transport] = at.mono + FIWARE_PAUSE_S
 
     def due(self, stop: FollowedCommand, at: Instant) -> list[SendStop]:
         """Sends that are due now; they count as sent."""
         hold_id = stop.hold_id or stop.command_id
-        sends = []
-        for way in self._ways.values():
-            is_due = self._is_free if way.one_at_a_time else self._is_due
-            if is_due(way.id, stop, at):
-                send = SendStop(stop.robot_id, hold_id, way.id, stop.command_id)
-                sends.append(send)
-        return sends
+        return [
+            SendStop(stop.robot_id, hold_id, transport.id, stop.command_id)
+            for transport in self._transports.values()
+            if self._is_due(transport, stop, at)
+        ]
 
-    def _is_due(self, way: TransportId, stop: FollowedCommand, at: Instant) -> bool:
-        """Whether to repeat it on a transport that takes any number."""
-        sent_at, age_then = self._sent.get(way, (-inf, 0.0))
+    def _is_due(self, transport: Transport, stop: FollowedCommand, at: Instant) -> bool:
+        """Whether a transport is due; then it counts as sent."""
+        if transport.is_serial:
+            return self._is_serial_due(transport.id, stop, at)
+        sent_at, age_then = self._sent.get(transport.id, (-inf, 0.0))
         pause_s = _PAUSE_S.get(stop.state, _pause(age_then))
         if at.mono - sent_at < pause_s - _EARLY_S:
             return False
-        self._sent[way] = at.mono, at.mono - stop.times.requested.mono
+        self._sent[transport.id] = at.mono, at.mono - stop.times.requested.mono
         return True
 
-    def _is_free(self, way: TransportId, stop: FollowedCommand, at: Instant) -> bool:
-        """Whether to ask a transport that takes one at a time."""
-        if way in self._busy or (stop.state in _PAUSE_S and not self._is_alone):
+    def _is_serial_due(
+        self, transport: TransportId, stop: FollowedCommand, at: Instant
+    ) -> bool:
+        """Whether a serial transport is due; then it counts as busy."""
+        if transport in self._busy or (stop.state in _PAUSE_S and not self._all_serial):
             return False
-        stands = stop.state == "STANDING"
-        rest_s = STANDING_RESEND_S - FIWARE_PAUSE_S if stands else 0.0
-        if at.mono < self._next.get(way, 0.0) + rest_s:
+        rest_s = STANDING_RESEND_S - FIWARE_PAUSE_S if stop.state == "STANDING" else 0.0
+        if at.mono < self._next.get(transport, 0.0) + rest_s:
             return False
-        self._busy.add(way)
+        self._busy.add(transport)
         return True
 
 
 def _pause(age_s: float) -> float:
-    """Pause after a send at this age of a STOP that the robot does not have (s)."""
+    """Pause after a send of a STOP of this age that the robot does not have (s)."""
     if age_s < 0.5 - _EARLY_S:
         return 0.25
     return 0.5 if age_s < 10.0 else 1.0
@@ -395,9 +416,11 @@ class StopStatus:
     """The state of one robot's STOP.
 
     Attributes:
-        stop: The STOP of this episode, as it is now.
-        attempt: The release or resume under way.
-        evidence: What the robot itself reports.
+        robot_id: The robot.
+        state: Its state, as drawn in ``machine``.
+        stop: The STOP of this episode; None: there is none.
+        attempt: The release or resume under way; None: there is none.
+        evidence: Reports and odometry of the robot.
     """
 
     def __init__(self, robot_id: str, transports: Iterable[Transport]) -> None:
@@ -406,42 +429,42 @@ class StopStatus:
         self.stop: FollowedCommand | None = None
         self.attempt: Attempt | None = None
         self.evidence = StopEvidence(robot_id)
-        self._transports = {way.id: way for way in transports}
-        self._sends = Sends(self._transports.values())
+        self._transports = {transport.id: transport for transport in transports}
+        self._timetable = Timetable(self._transports.values())
         self._joined_at = self._begun_at = -inf
         self._deadline = 0.0
-        self._doubt: str | None = None
-        """The challenge of a release that may still lift the hold that is kept."""
-        self._is_lost = False
-        """An event had no row in the state that still is."""
+        self._open_challenge: str | None = None
+        """Challenge of a release that may still lift the kept hold."""
+        self._had_no_row = False
+        """Whether the last event had no row in this state."""
 
     @property
     def wants_stop(self) -> bool:
-        """Whether a STOP stands that no reported release has ended."""
+        """Whether a STOP is in force that no reported release has ended."""
         return self.stop is not None and self.state not in ("RUNNING", "READY")
 
     def follows(self, command: FollowedCommand) -> bool:
-        """Whether this is the STOP that stands now."""
-        stop = self.stop if self.wants_stop else None
-        return stop is not None and stop.command_id == command.command_id
+        """Whether this command is the STOP in force."""
+        is_same = self.stop is not None and self.stop.command_id == command.command_id
+        return self.wants_stop and is_same
 
     @property
-    def once(self) -> FollowedCommand | None:
-        """The release or resume under way."""
+    def order(self) -> FollowedCommand | None:
+        """The release or resume under way; None: there is none."""
         return None if self.attempt is None else self.attempt.command
 
     @property
     def commands(self) -> tuple[FollowedCommand, ...]:
-        """The STOP, and the release or resume under way, as they are now."""
+        """The STOP, and the release or resume under way."""
         return tuple(
-            command for command in (self.stop, self.once) if command is not None
+            command for command in (self.stop, self.order) if command is not None
         )
 
     def _find(self, command_id: str) -> FollowedCommand | None:
-        found = (
-            command for command in self.commands if command.command_id == command_id
+        return next(
+            (command for command in self.commands if command.command_id == command_id),
+            None,
         )
-        return next(found, None)
 
     def _keep(self, command: FollowedCommand) -> None:
         """Store the new value of one of the two commands."""
@@ -456,35 +479,41 @@ class StopStatus:
         return None if self.stop is None else self.stop.hold_id
 
     def _hold_to_keep(self, at: Instant, *, expired: bool) -> Kept:
-        """The hold of iVeg, reported by the robot, that the next STOP holds on to.
+        """The reported hold that the next STOP asserts again (table in the head).
 
-        As a rule none: its hold is new.  But the robot may have just reported so many
-        that one more would only make a pile; or a release has ``expired`` and nothing
-        can lift any more what was reported after it.
+        ``expired``: Whether the robot has not confirmed the release in time.
         """
-        evidence, attempt = self.evidence, self.attempt
-        is_fresh = evidence.report_age(at) <= LIMITS.report_fresh_s
-        many = is_fresh and len(evidence.ours) >= LIMITS.most_holds
-        is_spent = attempt is not None and attempt.is_spent(evidence.report)
-        ours = evidence.ours if many or (expired and is_spent) else []
-        if not ours:
+        own_holds, challenge = self.evidence.ours, self._live_challenge()
+        is_fresh = self.evidence.report_age(at) <= LIMITS.report_fresh_s
+        is_full = is_fresh and len(own_holds) >= LIMITS.most_holds
+        if not own_holds or not (is_full or (expired and challenge is None)):
             return NEW_HOLD
-        doubt = self._doubt if attempt is None else attempt.challenge
-        kept = self.hold_id if self.hold_id in ours else ours[-1]
-        return Kept(kept, None if is_spent else doubt)
+        is_reported = self.hold_id in own_holds
+        return Kept(self.hold_id if is_reported else own_holds[-1], challenge)
 
-    def _is_doubtful(self, now: Instant) -> bool:
+    def _live_challenge(self) -> str | None:
+        """Challenge of a release that may still lift a hold; None: there is none."""
+        attempt = self.attempt
+        if attempt is None:
+            return self._open_challenge
+        return None if attempt.is_spent(self.evidence.report) else attempt.challenge
+
+    def _is_hold_doubtful(self, now: Instant) -> bool:
         """Whether a hold that may have been lifted goes unreported for too long."""
-        if self._doubt is None or not self.wants_stop or self.state == "RELEASING":
+        if (
+            self._open_challenge is None
+            or not self.wants_stop
+            or self.state == "RELEASING"
+        ):
             return False
+        # From the episode's begin at the earliest: the robot needs time to report.
         since_report = self.evidence.report_age(now)
         return min(since_report, now.mono - self._begun_at) > LIMITS.report_fresh_s
 
-    # --- what is recorded of it ---------------------------------------------------
+    # --- records ------------------------------------------------------------------
 
-    def _changed(
-        self, key: Key, about: FollowedCommand | None, why: str | None
-    ) -> Changed:
+    def _changed(self, key: Key, why: str | None) -> Changed:
+        about = self.order or self.stop
         command_id = "" if about is None else about.command_id
         return Changed(command_id, self.state, key, why, self.commands)
 

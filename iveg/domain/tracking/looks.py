@@ -1,4 +1,4 @@
-"""The probability that somebody is a person, from all looks at them.
+"""Probability that somebody is a person, from all looks at them.
 
 A detector that is 0.72 sure in every picture never reaches a threshold of 0.80, and is
 right nearly every time.  So its looks add up (naive Bayes, even prior)::
@@ -14,9 +14,9 @@ a second of it ends it::
     suspected ── looks or one box reach the threshold ──> confirmed
         └── odds below even, or 1 s unseen ──> over <── 1 s unseen ──┘
 
-A confirmed suspect is kept by any box of 0.25 or more in each second, however unsure
-(as ByteTrack keeps a track), and misses count no more.  None of this lifts anything: a
-zone that is drawn goes by time or by its own camera.
+Any box of 0.25 or more in each second keeps a confirmed suspect (as ByteTrack keeps a
+track), and misses count no more.  Looks lift nothing: a zone ends by time or by its own
+camera.
 """
 
 import math
@@ -28,10 +28,10 @@ from iveg.domain.observations import Instant
 
 FAINT_FROM = 0.50
 KEPT_FROM = 0.25
-"""Where detectors commonly cut what they report."""
+"""Least confidence that keeps a confirmed suspect; detectors commonly cut here."""
 LOOK_S = 0.3
 _SLACK_S = 0.01
-"""Pictures at 10 or 30 Hz are a multiple of it apart, nearly."""
+"""Tolerance of a look's length: pictures at 10 or 30 Hz come a little early (s)."""
 FORGOTTEN_S = 1.0
 _MISS = 1.0
 """Log-odds that 0.3 s without a look cost."""
@@ -53,9 +53,10 @@ class Looks:
     """All looks of a robot at one suspected person.
 
     Attributes:
-        count: Number of looks; ``least`` and ``most`` sure of them (0 to 1).
-        over_s: From the first to the newest (s).
-        probability: That it is a person (0 to 1).
+        count: Number of looks.
+        least: Least confidence of a look (0 to 1); ``most``: the greatest.
+        over_s: Time from the first look to the newest (s).
+        probability: Probability that it is a person (0 to 1).
         confirmed: Whether these looks, or a box among them, reached the threshold.
     """
 
@@ -69,7 +70,7 @@ class Looks:
 
 @dataclass(frozen=True, slots=True)
 class FaintPerson:
-    """A detection that may be a person: where in ``map`` (m), and how sure (0 to 1)."""
+    """A detection that may be a person: place in ``map`` (m), confidence (0 to 1)."""
 
     x: float
     y: float
@@ -83,7 +84,7 @@ class _Suspect:
     Attributes:
         odds: Log-odds of the looks that are over, and of their absence.
         look: Log-odds of the look that goes on since ``look_at``.
-        judged_at: Until when their absence has been counted.
+        judged_at: Moment up to which their absence has been counted.
     """
 
     x: float
@@ -100,9 +101,10 @@ class _Suspect:
     most: float = 0.0
 
     def see(self, box: FaintPerson, now: float) -> None:
-        """Take a box of a picture, which may be of the look that goes on."""
+        """Add a box of a picture, to the look that goes on or as a new look."""
         self.x, self.y, self.seen_at = box.x, box.y, max(self.seen_at, now)
         self.judged_at = self.seen_at
+        # A fainter box keeps the suspect and proves nothing.
         if box.confidence < FAINT_FROM:
             return
         self.least = min(self.least, box.confidence)
@@ -116,17 +118,18 @@ class _Suspect:
         self.count += 1
 
     def miss(self, now: float) -> None:
-        """It was not in a picture."""
+        """Count a picture that does not show it."""
         if not self.confirmed and now - self.judged_at >= LOOK_S - _SLACK_S:
             self.odds -= _MISS
             self.judged_at = now
 
     def is_over(self, now: float) -> bool:
-        """Whether nothing is left of it."""
+        """Whether it has been unseen for too long, or is less likely than not."""
         return now - self.seen_at > FORGOTTEN_S or self.log_odds < 0.0
 
     def reach_m(self, now: float) -> float:
-        """Distance up to which a detection may be of the same (m)."""
+        """Distance up to which a detection may be of this suspect (m)."""
+        # A late picture may be older than the newest box.
         return _NEAR_M + LIMITS.walking_m_s * abs(now - self.seen_at)
 
     @property
@@ -148,34 +151,40 @@ class Suspicions:
 
         Args:
             observer: The robot.
-            seen: Surest first, none below ``KEPT_FROM``.
-            at: When it looked.
+            seen: Its faint persons, surest first, none below ``KEPT_FROM``.
+            at: Moment of the picture.
             least: Probability from which on a person counts (0 to 1).
 
         Returns:
-            None for a box that is too faint for a suspicion and continues none.
+            Looks at each person; None: too faint for a suspicion, and continues none.
         """
         now = at.mono
         known = _kept(self._by_robot.get(observer, ()), now)
-        free = list(known)
-        found = [_match(box, free, known, now) for box in seen]
-        for suspect in free:
+        unmatched = list(known)
+        suspects = [_match(box, unmatched, known, now) for box in seen]
+        for suspect in unmatched:
             suspect.miss(now)
         self._by_robot[observer] = _kept(known, now)
-        return [None if one is None else _judged(one, least) for one in found]
+        return [
+            None if suspect is None else _judged(suspect, least) for suspect in suspects
+        ]
 
 
 def _match(
-    box: FaintPerson, free: list[_Suspect], known: list[_Suspect], now: float
+    box: FaintPerson, unmatched: list[_Suspect], known: list[_Suspect], now: float
 ) -> _Suspect | None:
-    """The nearest suspect within reach that the picture has not shown yet, or a new."""
+    """Nearest suspect in reach that the picture has not shown yet, else a new one."""
     is_look = box.confidence >= FAINT_FROM
-    suspect = _nearest(box, [one for one in free if is_look or one.confirmed], now)
+    # A box too faint for a look continues only a suspect that is confirmed already.
+    suspect = _nearest(
+        box,
+        [candidate for candidate in unmatched if is_look or candidate.confirmed],
+        now,
+    )
     if suspect is not None:
-        free.remove(suspect)
+        unmatched.remove(suspect)
     elif is_look:
-        look = logit(box.confidence)
-        suspect = _Suspect(box.x, box.y, look, now, now, now, now)
+        suspect = _Suspect(box.x, box.y, logit(box.confidence), now, now, now, now)
         known.append(suspect)
     else:
         return None
@@ -186,11 +195,11 @@ def _match(
 def _nearest(
     box: FaintPerson, suspects: Sequence[_Suspect], now: float
 ) -> _Suspect | None:
-    """The suspect that a box is nearest to; None: it is too far from each."""
+    """Suspect nearest to a box; None: the box is too far from all."""
     near = [
-        (apart, number)
+        (distance, number)
         for number, suspect in enumerate(suspects)
-        if (apart := math.hypot(box.x - suspect.x, box.y - suspect.y))
+        if (distance := math.hypot(box.x - suspect.x, box.y - suspect.y))
         <= suspect.reach_m(now)
         and not suspect.is_over(now)
     ]
@@ -198,7 +207,7 @@ def _nearest(
 
 
 def _judged(suspect: _Suspect, least: float) -> Looks:
-    """The looks at a suspect, which may confirm it."""
+    """Looks at a suspect, which may confirm it."""
     probability = 1 / (1 + math.exp(-suspect.log_odds))
     # One look alone is a box like any other.
     is_enough = suspect.count > 1 and probability >= least
@@ -214,5 +223,5 @@ def _judged(suspect: _Suspect, least: float) -> Looks:
 
 
 def _kept(known: Sequence[_Suspect], now: float) -> list[_Suspect]:
-    going_on = [one for one in known if not one.is_over(now)]
-    return sorted(going_on, key=lambda one: one.seen_at)[-MOST_SUSPECTS:]
+    going_on = [suspect for suspect in known if not suspect.is_over(now)]
+    return sorted(going_on, key=lambda suspect: suspect.seen_at)[-MOST_SUSPECTS:]

@@ -1,8 +1,8 @@
-"""Lines of sight: what a frame of a camera shows, and how zones and trust end by it.
+"""Lines of sight: the content of a camera frame, and how zones and trust end by it.
 
 A zone goes by time, or because the camera that made it has had its centre in view for a
-second and found nobody, not even faintly; never for one missing frame, and never by the
-word of another (docs/safety.md, "Age").  A camera that misses somebody whom another one
+second and found nobody, not even faintly.  Neither a missing frame nor another robot
+ends it (docs/safety.md, "Age").  A camera that misses somebody whom another camera
 surely sees is blind.
 """
 
@@ -23,18 +23,17 @@ from iveg.domain.observations import DetectionFrame, Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.looks import KEPT_FROM
 from iveg.domain.tracking.people import People, Placed
-from iveg.domain.tracking.person import Sighting, TrackedPerson
-from iveg.domain.words import meaning_of
+from iveg.domain.tracking.tracker import Sighting, TrackedPerson
 from iveg.domain.world import World
 
 CLEAR_S, CLEAR_FRAMES = 1.0, 5
 SUSPECT_M = 1.0
-"""A box so near to a place may be of the person who was there."""
+"""A box this near to a place may be of the person who was there (m)."""
 _EDGE_RAD = math.radians(5.0)
-"""Margin inside the picture within which a person is seen whole."""
+"""Margin inside the picture within which a person is whole."""
 _NEAR_M, _RANGE_SHARE = 1.0, 0.75
-_FRESH_S = 0.5
-"""A frame that took longer, or came so long after the one before, proves nothing."""
+_TOGETHER_S = 0.5
+"""Longest gap between two frames in a row (s)."""
 
 _Place = tuple[float, float]
 _NONE = np.empty(0, np.intp)
@@ -45,10 +44,10 @@ class Look:
     """Content of one frame of a camera.
 
     Attributes:
-        camera: Where it was made, in ``map``; None: it proves nothing to be empty.
-        people: Where it shows a person, however faintly, in ``map`` (m).
-        robots: The same of robots; ``unknown`` of what nobody has a word for.
-        at: When it came.
+        camera: Pose of the camera in ``map``; None: the frame proves no place empty.
+        people: Places of persons, however faint, in ``map`` (m).
+        robots: Places of robots; ``unknown`` of objects with an unknown word.
+        at: Moment of its receipt.
     """
 
     robot: RobotState
@@ -59,60 +58,60 @@ class Look:
     at: Instant
 
     @classmethod
-    def of_frame(
+    def from_frame(
         cls,
         robot: RobotState,
         frame: DetectionFrame,
         placed: Iterable[Placed],
         at: Instant,
     ) -> "Look":
-        """A frame that was taken in, and what of it could be placed."""
+        """Look by a frame that was taken in, and the detections that have a place."""
         places = defaultdict[str, list[_Place]](list)
-        for one in placed:
-            if one.detection.probability >= KEPT_FROM:
-                is_known = meaning_of(one.detection.class_id) is not None
-                meant = one.class_ or ("known" if is_known else "unknown")
-                places[meant].append(one.position[:2])
+        for box in placed:
+            if box.detection.probability >= KEPT_FROM:
+                meaning = box.class_ or ("known" if box.is_known else "unknown")
+                places[meaning].append(box.position[:2])
         origin = frame.origin
         pose, is_counted = robot.pose_at_stamp(origin.own_s), origin.seq is not None
         is_late = is_counted and not robot.is_newest(DetectionFrame, origin)
-        camera = None if pose is None or is_late else _camera_at(pose, robot, at)
+        # A late frame says nothing of what is there now.
+        camera = None if pose is None or is_late else robot.camera_at(pose, at)
         people, robots, unknown = (
-            places[one] for one in ("person", "robot", "unknown")
+            places[meaning] for meaning in ("person", "robot", "unknown")
         )
         return cls(robot, camera, people, robots, unknown, at)
 
     def in_view(
         self, spots: Sequence[_Place], greenhouse: Greenhouse
     ) -> NDArray[np.intp]:
-        """The spots at which a person would surely be in the picture."""
+        """Indices of the spots at which a person would surely be in the picture."""
         if self.camera is None or not spots:
             return _NONE
         return _in_view(self.camera, self.robot.profile, spots, greenhouse)
 
     def shows_person_at(self, x: float, y: float, within_m: float = SUSPECT_M) -> bool:
         """Whether a box may be of a person at a spot."""
-        return any(math.dist(one, (x, y)) <= within_m for one in self.people)
+        return any(math.dist(place, (x, y)) <= within_m for place in self.people)
 
     def shows(self, person: TrackedPerson, x: float, y: float) -> bool:
         """Whether a box may be of this person or robot; an unknown word counts."""
-        others = (*self.unknown, *(self.robots if person.class_ == "robot" else ()))
-        near = any(math.dist(one, (x, y)) <= SUSPECT_M for one in others)
+        places = (*self.unknown, *(self.robots if person.class_ == "robot" else ()))
+        near = any(math.dist(place, (x, y)) <= SUSPECT_M for place in places)
         return near or self.shows_person_at(x, y)
 
 
 def visible_from(
     robot: RobotState, spots: ArrayLike, greenhouse: Greenhouse, now: Instant
 ) -> NDArray[np.intp]:
-    """The spots that a robot's camera has in view now, with nothing in between.
+    """Indices of the spots that a robot's camera has in view, with nothing in between.
 
     Args:
-        robot: One whose camera may be blind: then none.
+        robot: The robot; a blind camera has none in view.
         spots: Shape (n, 2), in ``map`` (m).
         greenhouse: What stands in between.
         now: This moment.
     """
-    camera = _camera_now(robot, now)
+    camera = robot.camera_now(now)
     if camera is None:
         return _NONE
     return _in_view(camera, robot.profile, spots, greenhouse)
@@ -120,29 +119,7 @@ def visible_from(
 
 def is_detecting(robot: RobotState, now: Instant) -> bool:
     """Whether a robot's camera works and its place is known."""
-    return _camera_now(robot, now) is not None
-
-
-def _camera_now(robot: RobotState, now: Instant) -> Pose2D | None:
-    """Where a camera is that can be relied on."""
-    if robot.odometry is None or robot.detector.blind_by is not None:
-        return None
-    return _camera_at(robot.odometry.pose, robot, now)
-
-
-def _camera_at(pose: Pose2D, robot: RobotState, now: Instant) -> Pose2D | None:
-    """Where a robot's camera is, if its frames are read and fresh and it is LIVE.
-
-    Whoever contradicts itself, however shortly, finds no spot empty.
-    """
-    looked, detector = robot.detections_at, robot.detector
-    if looked is None or not robot.is_believed(now):
-        return None
-    is_unread = detector.is_flawed(now, but="blind")
-    is_late = now.mono - looked > _FRESH_S
-    if is_unread or is_late or detector.out_of_service is not None:
-        return None
-    return pose.compose(robot.profile.camera)
+    return robot.camera_now(now) is not None
 
 
 def _in_view(
@@ -157,10 +134,11 @@ def _in_view(
         & (distance <= _RANGE_SHARE * profile.camera_range)
         & (off <= profile.camera_fov / 2 - _EDGE_RAD)
     )
+    # A row of crop hides a person whose place is in the picture.
     clear = [
-        one
-        for one in in_picture.tolist()
-        if greenhouse.in_sight(camera.x, camera.y, x[one], y[one])
+        index
+        for index in in_picture.tolist()
+        if greenhouse.in_sight(camera.x, camera.y, x[index], y[index])
     ]
     return np.array(clear, np.intp)
 
@@ -170,10 +148,10 @@ class _Watch:
     """A zone that its own camera may find empty.
 
     Attributes:
-        sighting: That made it.
-        since: When the first of the frames in a row came that show nobody; ``newest``
-            (monotonic, s).
-        frames: How many they are.
+        sighting: The sighting that made it.
+        since: Receipt of the first of the frames in a row that show nobody (monotonic,
+            s); ``newest``: of the last.
+        frames: Number of these frames.
     """
 
     sighting: Sighting
@@ -181,21 +159,21 @@ class _Watch:
     newest: float = 0.0
     frames: int = 0
 
-    def going_on(self, at: float) -> "_Watch":
+    def after_empty_frame(self, at: float) -> "_Watch":
         """The watch after one more frame that shows nobody."""
-        is_first = self.frames == 0 or at - self.newest > _FRESH_S
+        is_first = self.frames == 0 or at - self.newest > _TOGETHER_S
         since, frames = (at, 1) if is_first else (self.since, self.frames + 1)
         return replace(self, since=since, newest=at, frames=frames)
 
     @property
     def is_over(self) -> bool:
-        """Whether that is long enough to end the zone."""
+        """Whether these frames are enough to end the zone."""
         lasted_s = self.newest - self.since
         return self.frames >= CLEAR_FRAMES and lasted_s >= CLEAR_S - 1e-6
 
 
 class OwnSight:
-    """Takes zones away whose own camera sees their place to be empty."""
+    """Ends zones whose own camera sees that their place is empty."""
 
     def __init__(self, greenhouse: Greenhouse) -> None:
         self._greenhouse = greenhouse
@@ -203,87 +181,99 @@ class OwnSight:
         """Watches by robot and chain."""
 
     def take(self, look: Look, people: People) -> list[TrackedPerson]:
-        """Take a frame that ``people`` has taken in; returns whose zones it ended."""
+        """Take a frame after ``people``; returns the persons that lost a zone by it."""
         before = self._watched.get(look.robot.robot_id, {})
         watched: dict[int, _Watch] = {}
-        ended: list[tuple[str, Sighting]] = []
-        for person, sighting in _own_zones(people, look):
+        zones = list(_own_zones(people, look))
+        empty = self._empty_chains(zones, look)
+        for _, sighting in zones:
             watch = before.get(sighting.chain)
+            # A newer sighting of the chain begins a new watch.
             if watch is None or watch.sighting.at != sighting.at:
                 watch = _Watch(sighting)
-            watch = self._looked(watch, person, look)
+            if sighting.chain in empty:
+                watch = watch.after_empty_frame(look.at.mono)
+            elif watch.frames:
+                watch = replace(watch, frames=0)
             watched[sighting.chain] = watch
-            if watch.is_over:
-                ended.append((person.person_id, sighting))
         self._watched[look.robot.robot_id] = watched
-        return [people.drop_sighting(*one) for one in ended]
+        return [
+            people.drop_sighting(person.person_id, sighting)
+            for person, sighting in zones
+            if watched[sighting.chain].is_over
+        ]
 
-    def _looked(self, watch: _Watch, person: TrackedPerson, look: Look) -> _Watch:
-        sighting = watch.sighting
-        place = sighting.x, sighting.y
-        is_empty = (
-            sighting.age_s(look.at) > LIMITS.seen_s
-            and look.robot.detector.blind_by is None
-            and not look.shows(person, *place)
-            and look.in_view([place], self._greenhouse).size == 1
-        )
-        if is_empty:
-            return watch.going_on(look.at.mono)
-        return replace(watch, frames=0) if watch.frames else watch
+    def _empty_chains(
+        self, zones: Iterable[tuple[TrackedPerson, Sighting]], look: Look
+    ) -> set[int]:
+        """Chains of the zones whose place a look shows to be empty."""
+        if look.robot.detector.blind_by is not None:
+            return set()
+        # A person in sight is not missed yet: the second begins after that.
+        missed = [
+            sighting
+            for person, sighting in zones
+            if sighting.age_s(look.at) > LIMITS.seen_s
+            and not look.shows(person, sighting.x, sighting.y)
+        ]
+        places = [(sighting.x, sighting.y) for sighting in missed]
+        in_view = look.in_view(places, self._greenhouse)
+        return {missed[index].chain for index in in_view}
 
 
 def _own_zones(people: People, look: Look) -> Iterator[tuple[TrackedPerson, Sighting]]:
-    """Zones of known places that the camera of a look made; none of a recording."""
+    """Zones at known places by the camera of this look; a recording has none."""
     robot = look.robot
     if robot.is_replay:
         return
     for person in people.known.values():
-        for one in person.sightings:
+        for sighting in person.sightings:
             if (
-                one.observer == robot.robot_id
-                and one.recording is None
-                and not (one.reach_m or one.laser)
+                sighting.observer == robot.robot_id
+                and sighting.recording is None
+                and not (sighting.reach_m or sighting.laser)
             ):
-                yield person, one
+                yield person, sighting
 
 
 # --- blind cameras ----------------------------------------------------------------
 
 BLIND_S = 5.0
 APART_S = 0.15
-"""Between two frames of one camera that are compared with what others see."""
+"""Least time between two frames of a camera that are compared (s)."""
 _HIDES_M = 0.5
-"""Half of a person who stands between, and the error of a place."""
+"""Half the width of a person in between, with the error of a place (m)."""
 
 
 class _Spell(NamedTuple):
-    """From the first to the newest frame without them (monotonic, s)."""
+    """Time in which a camera misses a person: first and newest frame (monotonic, s)."""
 
     began: float
     newest: float
 
 
 class BlindCameras:
-    """Finds cameras that report nothing where another one surely sees somebody.
+    """Finds cameras that report nobody where another camera surely sees somebody.
 
-    A covered lens sends empty frames, which look like an empty aisle.  A person who
-    stands for five seconds in the view of two cameras and is seen by one of them alone
-    tells them apart.  From then on no frame of the other is whole (docs/safety.md,
-    "Clear"), until it shows somebody again.
+    A covered lens sends empty frames, which look like an empty aisle.  The proof is a
+    person who stands in the view of two cameras for five seconds while only one camera
+    sees them.  From then on no frame of the other camera is whole, until it shows
+    somebody again (docs/safety.md, "Clear").
     """
 
     def __init__(self, greenhouse: Greenhouse) -> None:
         self._greenhouse = greenhouse
         self._missing: dict[str, dict[int, _Spell]] = {}
-        """Spells by robot, and chain of the other one."""
+        """Spells by robot, and by the chain of the other camera's sightings."""
         self._looked_at: dict[str, float] = {}
-        """Moment of each robot's newest frame that was taken (monotonic, s)."""
+        """Receipt of each robot's newest compared frame (monotonic, s)."""
 
     def take(self, look: Look, people: People, world: World) -> None:
-        """Take a frame that ``people`` has taken in.
+        """Take a frame after ``people``.
 
-        A frame that proves nothing (late, or somebody walks between) ends no spell:
-        more than a second without a frame that does is silence, which slows anyway.
+        A frame that proves nothing (late, or somebody walks in between) ends no spell.
+        More than a second without a frame that proves something is silence, which slows
+        robots anyway.
         """
         robot, now = look.robot, look.at.mono
         if now - self._looked_at.get(robot.robot_id, -math.inf) >= APART_S:
@@ -296,69 +286,81 @@ class BlindCameras:
         robot, now = look.robot, look.at.mono
         detector, before = robot.detector, self._missing.get(robot.robot_id, {})
         spells = self._missing[robot.robot_id] = {
-            chain: one
-            for chain, one in before.items()
-            if now - one.newest <= LIMITS.silence_s + 1e-6
+            chain: spell
+            for chain, spell in before.items()
+            if now - spell.newest <= LIMITS.silence_s + 1e-6
         }
-        for one, is_shown in self._sought(look, people, world):
+        for sighting, is_shown in self._sought(look, people, world):
             if is_shown:
-                spells.pop(one.chain, None)
+                spells.pop(sighting.chain, None)
                 continue
-            began = spells.get(one.chain, _Spell(now, now)).began
-            spells[one.chain] = _Spell(began, now)
+            began = spells.get(sighting.chain, _Spell(now, now)).began
+            spells[sighting.chain] = _Spell(began, now)
             if now - began >= BLIND_S - 1e-6:
-                detector.blind_by = one.observer
+                detector.blind_by = sighting.observer
+        # A camera that shows somebody and misses nobody is not blind.
         if detector.out_of_service is not None or (look.people and not spells):
             detector.blind_by = None
 
     def _sought(
         self, look: Look, people: People, world: World
     ) -> Iterator[tuple[Sighting, bool]]:
-        """People in view whom another camera surely sees, and whether this one does."""
+        """Sure sightings by other cameras, and whether this look shows them, too."""
         camera, reach_m = look.camera, look.robot.profile.camera_range
-        seen = [
-            one
+        nearby = [
+            sighting
             for person in people.known.values()
             if person.class_ == "person"
-            for one in person.sightings
-            if one.age_s(look.at) <= LIMITS.seen_s
-            and one.recording is None
-            and (camera is None or camera.distance_to(one.x, one.y) <= reach_m)
+            for sighting in person.sightings
+            if sighting.age_s(look.at) <= LIMITS.seen_s
+            and sighting.recording is None
+            and (
+                camera is None or camera.distance_to(sighting.x, sighting.y) <= reach_m
+            )
         ]
-        sure = [one for one in seen if _is_sure(one, look, world)]
-        in_view = look.in_view([(one.x, one.y) for one in sure], self._greenhouse)
-        for index, one in enumerate(sure):
-            near_m = SUSPECT_M + LIMITS.walking_m_s * one.age_s(look.at)
-            if look.shows_person_at(one.x, one.y, near_m):
-                yield one, True
+        sure = [sighting for sighting in nearby if _is_sure(sighting, look, world)]
+        in_view = look.in_view(
+            [(sighting.x, sighting.y) for sighting in sure], self._greenhouse
+        )
+        for index, sighting in enumerate(sure):
+            # The person may have walked since the other camera's sighting.
+            near_m = SUSPECT_M + LIMITS.walking_m_s * sighting.age_s(look.at)
+            if look.shows_person_at(sighting.x, sighting.y, near_m):
+                yield sighting, True
             elif camera is not None and index in in_view:
-                beside = ((two.x, two.y, _HIDES_M) for two in seen)
-                if not self._is_hidden(one, camera, [*beside, *_peers(look, world)]):
-                    yield one, False
+                beside = ((other.x, other.y, _HIDES_M) for other in nearby)
+                if not self._is_hidden(
+                    sighting, camera, [*beside, *_peers(look, world)]
+                ):
+                    yield sighting, False
 
     def _is_hidden(
-        self, one: Sighting, camera: Pose2D, bodies: list[tuple[float, float, float]]
+        self,
+        sighting: Sighting,
+        camera: Pose2D,
+        bodies: list[tuple[float, float, float]],
     ) -> bool:
-        """Whether crates, somebody or a peer stands between a camera and somebody."""
-        here, there = (camera.x, camera.y), (one.x, one.y)
+        """Whether a crate, person or peer stands between a camera and a sighting."""
+        here, there = (camera.x, camera.y), (sighting.x, sighting.y)
         return any(
-            each.area.crosses(*here, *there) for each in self._greenhouse.obstacles
+            crate.area.crosses(*here, *there) for crate in self._greenhouse.obstacles
         ) or any(
             math.dist((x, y), there) > _HIDES_M and _off((x, y), here, there) <= radius
             for x, y, radius in bodies
         )
 
 
-def _is_sure(one: Sighting, look: Look, world: World) -> bool:
-    """Whether a sighting is another camera's, by a box, of a robot beyond doubt."""
-    if one.observer == look.robot.robot_id or one.possible or one.laser or one.reach_m:
+def _is_sure(sighting: Sighting, look: Look, world: World) -> bool:
+    """Whether a sighting is by a box of another, trusted robot's camera."""
+    is_own = sighting.observer == look.robot.robot_id
+    if is_own or sighting.possible or sighting.laser or sighting.reach_m:
         return False
-    observer = world.robot(one.observer)
+    observer = world.robot(sighting.observer)
     return observer.is_believed(look.at) and not observer.detector.is_flawed(look.at)
 
 
 def _peers(look: Look, world: World) -> Iterator[tuple[float, float, float]]:
-    """Bodies of peers: x, y and half of their length, and the error of a place (m)."""
+    """Bodies of peers: x, y, and radius with the error of a place (m)."""
     for robot in world.live_robots():
         is_peer = robot is not look.robot and robot.is_believed(look.at)
         if is_peer and robot.odometry is not None:

@@ -40,9 +40,6 @@ def _add_emulator(emulator: argparse.ArgumentParser) -> None:
         help="of odometry, laser and camera each (default: 30)",
     )
     emulator.add_argument(
-        "--fault-port", type=int, metavar="PORT", help="take fault orders over HTTP"
-    )
-    emulator.add_argument(
         "--dds", action="store_true", help="they speak ROS 2, for `iveg robot`"
     )
     add_network(emulator)

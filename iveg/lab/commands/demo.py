@@ -60,8 +60,8 @@ def ros2_parts(robots: Sequence[str]) -> list[list[str]]:
     parts = [["emulator", "--dds", *place]]
     for robot in robots:
         name = f"/{namespace_of(robot)}"
-        who = ["--id", robot, "--namespace", name, "--attended"]
-        parts.append(["robot", *who, *place])
+        identity = ["--id", robot, "--namespace", name, "--attended"]
+        parts.append(["robot", *identity, *place])
     return parts
 
 
@@ -71,9 +71,11 @@ def _free_domain() -> int:
     Raises:
         SettingsError: there is none.
     """
+    # Not 0, the default of every other ROS 2 program.
     for domain in range(1, 100):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             try:
+                # RTPS: 250 ports a domain, the first participant's own is the tenth.
                 probe.bind(("127.0.0.1", 7400 + 250 * domain + 10))
             except OSError:
                 continue
@@ -83,32 +85,31 @@ def _free_domain() -> int:
 
 def on_free_ports(settings: Settings, environment: Mapping[str, str]) -> Settings:
     """Move defaults whose port is taken to a free port; chosen addresses stay."""
-    changes: dict[str, Any] = {}
-    page = _moved(environment, "IVEG_PORT", settings.host, settings.port)
-    if page is not None:
-        changes["port"] = page
+    changes: dict[str, Any] = {
+        "port": _free_port(environment, "IVEG_PORT", settings.host, settings.port)
+    }
     for field, variable, default in _FIWARE:
         parts = urlsplit(getattr(settings, field))
         host = parts.hostname or ""
         if host not in LOOPBACK:
             raise SettingsError(variable, host, "an address on loopback")
-        port = _moved(environment, variable, host, parts.port or default)
-        if port is not None:
+        wanted = parts.port or default
+        port = _free_port(environment, variable, host, wanted)
+        if port != wanted:
             changes[field] = f"{parts.scheme}://{host}:{port}"
     return replace(settings, **changes)
 
 
-def _moved(
+def _free_port(
     environment: Mapping[str, str], variable: str, host: str, port: int
-) -> int | None:
-    """A free port in place of one that is taken; None where it is free itself."""
+) -> int:
+    """The port, or a free one in place of a default that is taken."""
     try:
-        bind_once(host, port)
+        return bind_once(host, port)
     except OSError:
         if environment.get(variable):
             raise SettingsError(variable, str(port), "a port that is free") from None
         return bind_once(host, 0)
-    return None
 
 
 # --- processes --------------------------------------------------------------------

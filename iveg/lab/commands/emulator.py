@@ -38,8 +38,8 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
     members = fleet.members.values()
     robots = [member.robot_id for member in members if member.kind == "live"]
     if options.robots is not None:
-        more = range(len(robots) + 1, options.robots + 1)
-        robots = [*robots, *(f"AG{number}" for number in more)][: options.robots]
+        numbers = range(len(robots) + 1, options.robots + 1)
+        robots = [*robots, *(f"AG{number}" for number in numbers)][: options.robots]
     with (
         TemporaryDirectory(prefix="iveg-robots-") as directory,
         _network(options) as network,
@@ -50,7 +50,9 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
         emulated = SimulatedFleet(
             SimulatedWorld(greenhouse, layout, detector, options.seed),
             FleetSettings(
-                node_settings(settings, Path(directory), Plan.of(greenhouse)),
+                node_settings(
+                    settings, Path(directory), Plan.from_greenhouse(greenhouse)
+                ),
                 options.held,
                 options.hz,
                 has_equipment=settings.equipment == DEMO,
@@ -58,10 +60,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
             network,
         )
         report_ready()
-        if options.fault_port is None:
-            await emulated.run()
-        else:
-            await emulated.run_with_faults(options.fault_port)
+        await emulated.run()
 
 
 def _network(options: argparse.Namespace) -> "AbstractContextManager[Dds | None]":

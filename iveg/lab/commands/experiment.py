@@ -88,7 +88,7 @@ class Lab:
     """One running experiment.
 
     Attributes:
-        directory: Where its results go.
+        directory: Folder of its results.
         keep_raw: Whether raw data stay.
         exit_code: 1 if it ended before its plan was complete.
     """
@@ -104,7 +104,7 @@ class Lab:
         """Run every step, then write the report."""
         surroundings = {**environment, **self.settings.to_environment()}
         print(f"experiment: {self.directory}", flush=True)
-        why = "interrupted"
+        reason = "interrupted"
         try:
             async with running_parts(surroundings) as parts:
                 await parts.start("fiware")
@@ -112,15 +112,15 @@ class Lab:
                 await parts.start("serve", "--demo")
                 for step in self.plan.steps():
                     await self._step(step, parts)
-            why = ""
+            reason = ""
         except (HopError, DataFileError, SystemExit) as error:
-            why = str(error)
+            reason = str(error)
         finally:
-            self._finish(why)
+            self._finish(reason)
 
     async def _step(self, step: PlannedRun, parts: Parts) -> None:
         self._say(step, "virtual clock")
-        rehearsal = VirtualRun(step, DetectionRule.of(self.settings.rule))
+        rehearsal = VirtualRun(step, DetectionRule.from_parameters(self.settings.rule))
         virtual = await parts.outlast(rehearsal.play(step.counted_s))
         real = None
         if step.is_timed:
@@ -129,8 +129,7 @@ class Lab:
         timed = None if real is None else timed_of(real)
         outcome = outcome_of(step, counted_of(virtual), timed)
         if self.keep_raw:
-            raw = self.directory / "raw" / step.name
-            write_raw(raw, outcome, virtual, real)
+            write_raw(self.directory / "raw" / step.name, outcome, virtual, real)
         self._outcomes.append(outcome)
 
     def _say(self, step: PlannedRun, half: str) -> None:

@@ -1,5 +1,6 @@
 """The embedded FIWARE as a process."""
 
+import asyncio
 from urllib.parse import urlsplit
 
 from iveg.cli.arguments import CommandCall
@@ -8,7 +9,7 @@ from iveg.cli.running import (
     run_until_stopped,
     tune_garbage_collection,
 )
-from iveg.lab.embedded.server import serve_fiware
+from iveg.lab.embedded.server import embedded_fiware
 from iveg.settings import Settings
 
 
@@ -21,12 +22,13 @@ def run(call: CommandCall) -> int:
 async def fiware(settings: Settings) -> None:
     """The embedded MQTT broker, Orion and IoT Agent."""
     tune_garbage_collection()
-    await serve_fiware(
+    async with embedded_fiware(
         _address(settings.mqtt_url, 1883),
         _address(settings.orion_url, 1026),
         _address(settings.iota_url, 4041),
-        notify_ready=report_ready,
-    )
+    ):
+        report_ready()
+        await asyncio.Event().wait()
 
 
 def _address(url: str, default_port: int) -> tuple[str, int]:

@@ -58,7 +58,7 @@ class Parts:
             start_new_session=True,
         )
         self.running.append((name, process))
-        assert process.stdout is not None  # noqa: S101 - it was asked for
+        assert process.stdout is not None  # noqa: S101 - a pipe, as above
         line = b""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(_PATIENCE_S):

@@ -1,7 +1,7 @@
 """In-memory context broker that answers NGSI-v2 over HTTP as Orion 4.7 does.
 
-Only what iVeg asks for; all else is refused with 501.  Its limits are listed in
-``docs/fiware.md``.  The embedded IoT Agent calls its operations directly.
+It has the requests that iVeg makes; all others are refused with 501.  Its limits are
+listed in ``docs/fiware.md``.  The embedded IoT Agent calls its operations directly.
 """
 
 import asyncio
@@ -48,6 +48,7 @@ class Registration:
     Attributes:
         path: Service path.
         url: Address of the provider.
+        provider: The provider itself, which is in this process.
     """
 
     id: str
@@ -56,11 +57,12 @@ class Registration:
     entity_type: str
     attrs: tuple[str, ...]
     url: str
+    provider: Provider
 
     def provides(self, path: str, entity_id: str, kind: str, name: str) -> bool:
         """Whether an attribute of an entity is among them."""
-        mine = self.path, self.entity_id, self.entity_type
-        return mine == (path, entity_id, kind) and name in self.attrs
+        own_keys = self.path, self.entity_id, self.entity_type
+        return own_keys == (path, entity_id, kind) and name in self.attrs
 
     def show(self) -> dict[str, Any]:
         """The registration as a client gets it."""
@@ -87,15 +89,10 @@ class Tenant:
 
 
 class ContextBroker:
-    """Entities, subscriptions and registrations of all tenants.
-
-    Attributes:
-        providers: Context providers of this process, by address.
-    """
+    """Entities, subscriptions and registrations of all tenants."""
 
     def __init__(self) -> None:
         self._tenants: dict[str, Tenant] = {}
-        self.providers: dict[str, Provider] = {}
         self._passing: set[asyncio.Future[None]] = set()
 
     def tenant(self, service: str) -> Tenant:
@@ -126,18 +123,18 @@ class ContextBroker:
         Raises:
             FiwareError: 404, there is none.
         """
-        found = self.known(scope, entity_id, kind)
-        if found is None:
+        entity = self.known(scope, entity_id, kind)
+        if entity is None:
             raise not_found()
-        return found
+        return entity
 
     def upsert(
         self, scope: Scope, entity_id: str, kind: str, changes: Mapping[str, Attribute]
     ) -> None:
         """Create an entity, or add to and change its attributes; notify."""
-        made = Entity(entity_id, kind, scope.path)
+        entity = Entity(entity_id, kind, scope.path)
         entities = self.tenant(scope.service).entities
-        self.append(scope, entities.setdefault(made.key, made), changes)
+        self.append(scope, entities.setdefault(entity.key, entity), changes)
 
     def append(
         self, scope: Scope, entity: Entity, changes: Mapping[str, Attribute]
@@ -149,7 +146,7 @@ class ContextBroker:
             if subscription.wants(entity, changed, now):
                 subscription.notify(entity, now)
 
-    # --- updates that may have to be passed on ----------------------------------
+    # --- updates that may go to a provider --------------------------------------
 
     async def update(
         self, scope: Scope, entity_id: str, kind: str, changes: Mapping[str, Attribute]
@@ -159,16 +156,16 @@ class ContextBroker:
         An attribute that is here is never passed on.
 
         Raises:
-            FiwareError: 404, no such entity, or its provider is away; 422, no such
+            FiwareError: 404, no such entity, or its provider is silent; 422, no such
                 attribute.  The possible part is done.
         """
         entity = self.known(scope, entity_id, kind)
         kind = entity.type if entity else kind
-        own = entity.attributes if entity else {}
-        local = {name: change for name, change in changes.items() if name in own}
+        attributes = entity.attributes if entity else {}
+        local = {name: change for name, change in changes.items() if name in attributes}
         if entity is not None and local:
             self.append(scope, entity, local)
-        missing = []
+        unknown = []
         for name in changes.keys() - local.keys():
             for registration in self.tenant(scope.service).registrations.values():
                 if registration.provides(scope.path, entity_id, kind, name):
@@ -177,30 +174,27 @@ class ContextBroker:
                     )
                     break
             else:
-                missing.append(name)
-        if missing and entity is None:
+                unknown.append(name)
+        if unknown and entity is None:
             raise not_found()
-        if missing:
-            sentence = f"do not exist: {entity_id} - [ {', '.join(missing)} ]"
+        if unknown:
+            sentence = f"do not exist: {entity_id} - [ {', '.join(unknown)} ]"
             raise FiwareError("Unprocessable", sentence)
 
     async def _pass_on(
         self, registration: Registration, scope: Scope, values: Mapping[str, object]
     ) -> None:
-        """Let a provider do its part; it may go on after it was given up.
+        """Let a provider do its part; after the time limit it may still go on.
 
         Raises:
-            FiwareError: 404, it is away, silent or refuses.
+            FiwareError: 404, it is silent or refuses.
         """
-        provider = self.providers.get(registration.url)
-        if provider is None:
-            raise not_found()
         entity = registration.entity_id, registration.entity_type
-        passing = asyncio.ensure_future(provider(scope, *entity, values))
+        passing = asyncio.ensure_future(registration.provider(scope, *entity, values))
         self._passing.add(passing)
         passing.add_done_callback(self._passing.discard)
-        done, _ = await asyncio.wait({passing}, timeout=PATIENCE_S)
-        if not done or passing.exception() is not None:
+        finished, _ = await asyncio.wait({passing}, timeout=PATIENCE_S)
+        if not finished or passing.exception() is not None:
             raise not_found()
 
 
@@ -214,7 +208,7 @@ _PATH = re.compile(r"/|(/[A-Za-z0-9_]{1,50}){1,10}")
 
 
 class _Call:
-    """One request, with what came with it.
+    """One request with its parameters, scope and body.
 
     Raises:
         FiwareError: 400, 413 or 501.
@@ -273,7 +267,7 @@ class _Call:
         names = _split(self.query.get("attrs"))
         return EntityView(names, "keyValues" in self.options, bool(dated))
 
-    def page(self, shown: Iterable[bytes]) -> Response:
+    def page(self, items: Iterable[bytes]) -> Response:
         """The requested part of a list of JSON texts.
 
         Raises:
@@ -282,7 +276,7 @@ class _Call:
         limit, offset = self._number("limit", "20"), self._number("offset", "0")
         if limit > 1000:
             raise bad_request(f"Bad pagination limit: /{limit}/ [max: 1000]")
-        texts = list(shown)
+        texts = list(items)
         body = b"[%b]" % b",".join(texts[offset : offset + limit])
         return _json(body, {"Fiware-Total-Count": str(len(texts))})
 
@@ -343,7 +337,7 @@ async def _list_entities(call: _Call) -> Response:
     ids, kinds = _split(call.query.get("id")), _split(call.kind)
     if call.query.get("orderBy", "id") != "id":
         raise not_supported("orderBy other than id")
-    found = [
+    entities = [
         entity
         for entity in call.tenant.entities.values()
         if entity.path == call.scope.path
@@ -352,8 +346,8 @@ async def _list_entities(call: _Call) -> Response:
     ]
     view = call.view()
     if "orderBy" in call.query:
-        found.sort(key=lambda entity: entity.id)
-    return call.page(write_entity(entity, view) for entity in found)
+        entities.sort(key=lambda entity: entity.id)
+    return call.page(write_entity(entity, view) for entity in entities)
 
 
 async def _get_entity(call: _Call) -> Response:
@@ -363,8 +357,7 @@ async def _get_entity(call: _Call) -> Response:
 
 async def _delete_entity(call: _Call) -> Response:
     """Delete an entity; nobody is notified."""
-    entity = call.broker.find(call.scope, call.name, call.kind)
-    del call.tenant.entities[entity.key]
+    del call.tenant.entities[call.broker.find(call.scope, call.name, call.kind).key]
     return Response(status_code=204)
 
 

@@ -7,8 +7,8 @@ error are discarded here too: text that is not JSON, bare numbers and strings, a
 invalid ``TimeInstant``.
 """
 
-import logging
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -63,7 +63,7 @@ class DeviceCommand(BaseModel):
 
 
 class _Provisioned(BaseModel):
-    """Fields of groups and devices alike; other fields are taken and ignored.
+    """Common fields of groups and devices; other fields are ignored.
 
     Lazy and static attributes, which the embedded agent cannot do, are refused.
     """
@@ -155,8 +155,8 @@ def read_measure(
     if len(payload) > MAX_MEASURE:
         raise bad_request(f"payload size: {len(payload)}")
     clean = looks_clean(payload)
-    given = measure.pop(_INSTANT, None)
-    instant = write_date(now) if given is None else read_date(given)
+    instant_value = measure.pop(_INSTANT, None)
+    instant = write_date(now) if instant_value is None else read_date(instant_value)
     changes = {}
     for key, value in measure.items():
         name, kind = device.mapping.get(key) or (_RENAMED.get(key, key), "Text")
@@ -199,7 +199,6 @@ _ABOUT = {
     "baseRoot": "/",
     "version": "3.14.0-iveg-embedded",
 }
-_log = logging.getLogger(__name__)
 _READERS = {"attrs": read_measure, "cmdexe": read_answer}
 
 
@@ -213,6 +212,7 @@ class IotAgent:
     Attributes:
         groups: By tenant and path, resource and API key, oldest first.
         devices: By tenant and path, API key and id, oldest first.
+        url: Address of the north port, with which commands are registered.
     """
 
     def __init__(self, broker: ContextBroker, mqtt: MqttBroker) -> None:
@@ -221,13 +221,8 @@ class IotAgent:
         self.groups: dict[tuple[Scope, str, str], Group] = {}
         self.devices: dict[tuple[Scope, str, str], AgentDevice] = {}
         self._by_place: dict[str, AgentDevice] = {}
-        self._url = ""
-        mqtt.listen(self.hear)
-
-    def is_at(self, url: str) -> None:
-        """Commands are registered with this address, that of the north port."""
-        self._url = url
-        self._broker.providers[url] = self.command
+        self.url = ""
+        mqtt.listen(self.receive)
 
     def north_port(self) -> Starlette:
         """Its HTTP side, which answers requests as the real one does."""
@@ -244,8 +239,8 @@ class IotAgent:
 
     # --- measures ---------------------------------------------------------------
 
-    def hear(self, topic: str, payload: bytes) -> None:
-        """Handle an MQTT message, if it is of a device that is provisioned.
+    def receive(self, topic: str, payload: bytes) -> None:
+        """Handle an MQTT message of a provisioned device; ignore all others.
 
         Topics are ``/{apikey}/{device}/attrs`` and ``…/cmdexe``.
         """
@@ -253,12 +248,8 @@ class IotAgent:
         device = self._by_place.get(place)
         if device is None or kind not in _READERS:
             return
-        now = clock.wall()
-        try:
-            self._write(device, _READERS[kind](device, payload, now))
-        except FiwareError as error:
-            # Devices get no error.
-            _log.debug("a message on %s was discarded: %s", topic, error)
+        with suppress(FiwareError):  # devices get no error
+            self._write(device, _READERS[kind](device, payload, clock.wall()))
 
     def _write(self, device: AgentDevice, changes: Mapping[str, Attribute]) -> None:
         if changes:
@@ -280,8 +271,12 @@ class IotAgent:
                 'Missing attributes: ["device_id"] with: the device',
             )
         service, path = scope
-        made = {"service": service, "service_path": path, "registration_id": new_id()}
-        device = _read(AgentDevice, {**raw, **made})
+        registered = {
+            "service": service,
+            "service_path": path,
+            "registration_id": new_id(),
+        }
+        device = _read(AgentDevice, {**raw, **registered})
         key = scope, device.apikey, device.device_id
         if key in self.devices:
             raise FiwareError(
@@ -290,10 +285,14 @@ class IotAgent:
                 f"was found:{device.device_id}",
             )
         if device.commands:
-            names = tuple(command.name for command in device.commands)
-            entity = device.entity_name, device.entity_type
             self._registrations(device)[device.registration_id] = Registration(
-                device.registration_id, path, *entity, names, self._url
+                device.registration_id,
+                path,
+                device.entity_name,
+                device.entity_type,
+                tuple(command.name for command in device.commands),
+                self.url,
+                self.command,
             )
         self.devices[key] = self._by_place[device.place] = device
 
@@ -308,22 +307,22 @@ class IotAgent:
         """Publish commands of one entity.
 
         Several devices may share the entity.  MongoDB answers in the order of its
-        index: the command goes to the one whose API key and id sort first, and is
-        ignored where that has none of this name.  A command without a connected robot
-        is lost.
+        index: the command goes to the device whose API key and id sort first, and is
+        ignored if that device lacks it.  A command to a robot that is not connected is
+        lost.
 
         Raises:
             FiwareError: 404, no device has this entity.
         """
-        found = [
+        sharing = [
             device
             for key, device in sorted(self.devices.items(), key=lambda item: item[0])
             if key[0] == scope
             and (device.entity_name, device.entity_type) == (name, kind)
         ]
-        if not found:
+        if not sharing:
             raise _no_device(name)
-        device, now = found[0], clock.wall()
+        device, now = sharing[0], clock.wall()
         for command in device.command_names & values.keys():
             self._mqtt.publish(
                 f"{device.place}/cmd", orjson.dumps({command: values[command]})
@@ -371,7 +370,7 @@ class IotAgent:
             request.query_params.get(name, "") for name in ("resource", "apikey")
         )
         key = _scope(request), resource, apikey
-        raw, group = await _object(request), self.groups.get(key)
+        raw, group = load_object(await request.body()), self.groups.get(key)
         if group is None:
             raise FiwareError(
                 "DEVICE_GROUP_NOT_FOUND",
@@ -415,26 +414,19 @@ def _no_device(name: str) -> FiwareError:
 
 def _scope(request: Request) -> Scope:
     names = "fiware-service", "fiware-servicepath"
-    missing = [name for name in names if not request.headers.get(name)]
-    if missing:
+    absent = [name for name in names if not request.headers.get(name)]
+    if absent:
         raise FiwareError(
             "MISSING_HEADERS",
             "Some headers were missing from the request: "
-            + orjson.dumps(missing).decode(),
+            + orjson.dumps(absent).decode(),
         )
     service, path = (request.headers[name] for name in names)
     return Scope(service.lower(), path)
 
 
-async def _object(request: Request) -> dict[str, Any]:
-    try:
-        return load_object(await request.body())
-    except FiwareError:
-        raise _wrong_syntax() from None
-
-
 async def _listed(request: Request, name: str) -> Iterable[dict[str, Any]]:
-    listed = (await _object(request)).get(name)
+    listed = load_object(await request.body()).get(name)
     if not isinstance(listed, list) or not all(isinstance(raw, dict) for raw in listed):
         raise _wrong_syntax()
     return listed
@@ -445,8 +437,8 @@ def _page(request: Request, name: str, listed: list[dict[str, Any]]) -> Response
     limit, offset = query.get("limit", "20"), query.get("offset", "0")
     if not (limit.isdecimal() and offset.isdecimal()):
         raise _wrong_syntax()
-    shown = listed[int(offset) : int(offset) + int(limit)]
-    return _json({"count": len(listed), name: shown})
+    part = listed[int(offset) : int(offset) + int(limit)]
+    return _json({"count": len(listed), name: part})
 
 
 def _json(value: object, status: int = 200) -> Response:

@@ -11,7 +11,7 @@ import logging
 import secrets
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from typing import NamedTuple, cast
+from typing import cast
 
 from paho.mqtt.client import topic_matches_sub
 
@@ -49,7 +49,7 @@ def packet_bounds(data: bytes, start: int) -> tuple[int, int]:
 def publish_packet(
     topic: str, payload: bytes, packet_id: int | None = None, *, retain: bool = False
 ) -> bytes:
-    """A PUBLISH (section 3.3): at QoS 1 if it has a packet identifier, else at 0."""
+    """A PUBLISH (section 3.3): at QoS 1 with a packet identifier, at QoS 0 without."""
     name = topic.encode()
     number = b"" if packet_id is None else packet_id.to_bytes(2)
     kind = PUBLISH | (QOS_1 if number else 0) | (RETAINED if retain else 0)
@@ -67,7 +67,7 @@ def _packet(kind: int, body: bytes) -> bytes:
 
 
 def _field(body: bytes, at: int) -> tuple[bytes, int]:
-    """A field with its length before it (section 1.5.3), and where it ends.
+    """A field with its length before it (section 1.5.3), and the end of the field.
 
     Raises:
         ValueError: the packet is shorter than stated.
@@ -89,15 +89,6 @@ scans.  Messages to be confirmed queue behind it, up to ``LARGEST_PACKET``."""
 Listener = Callable[[str, bytes], None]
 
 
-class Publication(NamedTuple):
-    """A message that a client or code in the process publishes."""
-
-    topic: str
-    payload: bytes
-    qos: int = 0
-    retain: bool = False
-
-
 class MqttBroker:
     """Clients, their subscriptions and retained messages.
 
@@ -112,7 +103,7 @@ class MqttBroker:
         self.clients: dict[str, BrokerClient] = {}
         self.connections: set[BrokerClient] = set()
         self._listeners: list[Listener] = []
-        self._retained: dict[str, Publication] = {}
+        self._retained: dict[str, tuple[bytes, int]] = {}
         self._audiences: dict[str, list[tuple[BrokerClient, int]]] = {}
 
     # --- code in the process ----------------------------------------------------
@@ -121,26 +112,37 @@ class MqttBroker:
         """Call ``listener`` with every message of clients; it must not block."""
         self._listeners.append(listener)
 
-    def publish(self, topic: str, payload: bytes) -> None:
-        """Publish a message at QoS 0, which listeners do not get."""
-        self._spread(Publication(topic, payload))
+    def publish(self, topic: str, payload: bytes, qos: int = 0) -> None:
+        """Publish a message to subscribers; listeners do not get it."""
+        packet = publish_packet(topic, payload)
+        for client, granted_qos in self._audience(topic):
+            if granted_qos and qos:
+                client.write_confirmed(topic, payload)
+            # Telemetry that waits for a slow client would arrive old.
+            elif client.unsent <= MOST_UNSENT:
+                client.transport.write(packet)
 
     # --- clients ----------------------------------------------------------------
 
-    def receive(self, publication: Publication) -> None:
+    def receive(self, topic: str, payload: bytes, qos: int, *, retain: bool) -> None:
         """Deliver a client's message."""
         for listener in self._listeners:
             try:
-                listener(publication.topic, publication.payload)
+                listener(topic, payload)
             except Exception:
-                _log.exception("a message on %s could not be taken", publication.topic)
-        self._spread(publication)
+                _log.exception("a message on %s could not be taken", topic)
+        self.publish(topic, payload, qos)
+        if retain and payload:
+            self._retained[topic] = payload, qos
+        elif retain:
+            self._retained.pop(topic, None)
 
     def admit(self, client: "BrokerClient") -> None:
         """Add a client; an older connection of the same identifier is closed."""
         older = self.clients.get(client.client_id)
         self.clients[client.client_id] = client
         if older is not None:
+            # A returning client must not wait for the end of its lost connection.
             older.transport.abort()
 
     def leave(self, client: "BrokerClient") -> None:
@@ -154,26 +156,13 @@ class MqttBroker:
         """Clear the cache after a change of subscriptions."""
         self._audiences.clear()
 
-    def retained(self, topic_filter: str) -> list[Publication]:
-        """Retained messages that fit a filter."""
+    def retained(self, topic_filter: str) -> list[tuple[str, bytes, int]]:
+        """Topic, payload and QoS of retained messages that fit a filter."""
         return [
-            publication
-            for topic, publication in self._retained.items()
+            (topic, *message)
+            for topic, message in self._retained.items()
             if topic_matches_sub(topic_filter, topic)
         ]
-
-    def _spread(self, publication: Publication) -> None:
-        topic, payload, qos, retain = publication
-        packet = publish_packet(topic, payload)
-        for client, wanted in self._audience(topic):
-            if wanted and qos:
-                client.write_confirmed(topic, payload)
-            elif client.unsent <= MOST_UNSENT:
-                client.transport.write(packet)
-        if retain and payload:
-            self._retained[topic] = publication
-        elif retain:
-            self._retained.pop(topic, None)
 
     def _audience(self, topic: str) -> list[tuple["BrokerClient", int]]:
         """Subscribers of a topic with their quality of service."""
@@ -218,7 +207,7 @@ async def mqtt_broker(host: str, port: int) -> AsyncIterator[MqttBroker]:
 class BrokerClient(asyncio.Protocol):
     """Splits the bytes of one client into packets and answers them.
 
-    Anything but CONNECT at first, and what cannot be read, ends the connection.
+    A first packet other than CONNECT, or an unreadable packet, ends the connection.
 
     Args:
         broker: Gets the client's messages.
@@ -270,6 +259,7 @@ class BrokerClient(asyncio.Protocol):
         start = 0
         while not self.transport.is_closing():
             body, end = packet_bounds(data, start)
+            # Judged by the stated length, before the packet can fill the memory.
             if end - start > LARGEST_PACKET:
                 self.transport.abort()
             elif not body or end > len(data):
@@ -313,7 +303,7 @@ class BrokerClient(asyncio.Protocol):
         payload = at + (2 if qos else 0)
         if payload > len(body) or qos > 1:
             raise ValueError(kind)
-        self._broker.receive(Publication(name.decode(), body[payload:], qos, retain))
+        self._broker.receive(name.decode(), body[payload:], qos, retain=retain)
         if qos:
             self.transport.write(_packet(_PUBACK, body[at:payload]))
 
@@ -328,9 +318,9 @@ class BrokerClient(asyncio.Protocol):
         self.filters.update(granted)
         self._broker.forget_audiences()
         self.transport.write(_packet(_SUBACK, body[:2] + bytes(granted.values())))
-        for topic_filter, wanted in granted.items():
-            for topic, payload, qos, _ in self._broker.retained(topic_filter):
-                number = self._next_number() if min(qos, wanted) else None
+        for topic_filter, granted_qos in granted.items():
+            for topic, payload, qos in self._broker.retained(topic_filter):
+                number = self._next_number() if min(qos, granted_qos) else None
                 self.transport.write(
                     publish_packet(topic, payload, number, retain=True)
                 )

@@ -16,7 +16,6 @@ from iveg.lab.embedded.iot_agent import IotAgent
 from iveg.lab.embedded.mqtt_broker import MqttBroker, mqtt_broker
 
 Address = tuple[str, int]
-MakeAgent = Callable[[ContextBroker, MqttBroker], IotAgent]
 _LONGEST_HEAD = 16_384
 _KEPT_S = 60
 _GRACE_S = 1.0
@@ -28,32 +27,17 @@ class Running:
 
     Attributes:
         mqtt_port: Port of the MQTT broker.
-        orion_port: NGSI-v2.
-        iota_port: North port of the agent.
+        orion_url: Address of the context broker.
+        iota_url: Address of the agent's north port.
         broker: For inspection.
         agent: For inspection.
     """
 
     mqtt_port: int
-    orion_port: int
-    iota_port: int
+    orion_url: str
+    iota_url: str
     broker: ContextBroker
     agent: IotAgent
-
-    @property
-    def mqtt_url(self) -> str:
-        """Address of the MQTT broker."""
-        return f"mqtt://127.0.0.1:{self.mqtt_port}"
-
-    @property
-    def orion_url(self) -> str:
-        """Address of the context broker."""
-        return f"http://127.0.0.1:{self.orion_port}"
-
-    @property
-    def iota_url(self) -> str:
-        """Address of the agent's north port."""
-        return f"http://127.0.0.1:{self.iota_port}"
 
 
 @asynccontextmanager
@@ -62,7 +46,7 @@ async def embedded_fiware(
     orion: Address = ("127.0.0.1", 0),
     iota: Address = ("127.0.0.1", 0),
     *,
-    make_agent: MakeAgent = IotAgent,
+    make_agent: Callable[[ContextBroker, MqttBroker], IotAgent] = IotAgent,
 ) -> AsyncIterator[Running]:
     """Run all three while the block lasts; port 0 takes a free one.
 
@@ -90,8 +74,9 @@ async def embedded_fiware(
         iota_port = await stack.enter_async_context(
             http_server(agent.north_port(), iota_host, iota[1])
         )
-        agent.is_at(f"http://{iota_host}:{iota_port}")
-        yield Running(south.port, orion_port, iota_port, broker, agent)
+        agent.url = f"http://{iota_host}:{iota_port}"
+        orion_url = f"http://{orion_host}:{orion_port}"
+        yield Running(south.port, orion_url, agent.url, broker, agent)
 
 
 @asynccontextmanager
@@ -134,7 +119,7 @@ async def http_server(app: ASGIApp, host: str, port: int) -> AsyncIterator[int]:
 
 
 async def _end(server: uvicorn.Server) -> None:
-    """Close listener and connections, once what is being answered had a second.
+    """Close listener and connections; running answers get a second to end.
 
     ``Server.shutdown`` waits for at least 0.1 s, which each test would pay twice.
     """
@@ -149,32 +134,6 @@ async def _end(server: uvicorn.Server) -> None:
         connection.shutdown()
     # The loop closes their sockets before it comes back here.
     await asyncio.sleep(0)
-
-
-async def serve_fiware(
-    mqtt: Address,
-    orion: Address,
-    iota: Address,
-    *,
-    notify_ready: Callable[[], None],
-    make_agent: MakeAgent = IotAgent,
-) -> None:
-    """Run the embedded FIWARE until cancelled.
-
-    Args:
-        mqtt: Host and port of the MQTT broker.
-        orion: Host and port of the context broker.
-        iota: Host and port of the agent's north side.
-        notify_ready: Called once when all three take requests.
-        make_agent: Gives the agent.
-
-    Raises:
-        SettingsError: an address that is not loopback.
-        OSError: a port that is taken.
-    """
-    async with embedded_fiware(mqtt, orion, iota, make_agent=make_agent):
-        notify_ready()
-        await asyncio.Event().wait()
 
 
 def require_loopback(setting: str, host: str) -> str:

@@ -3,8 +3,8 @@
 Each entity of a subscription has a lane: a queue, a task and one connection, so that
 its notifications keep their order.
 
-Not by httpx: a post costs 1.5 ms of processor time there, and ten robots make 900 in a
-second.
+It does without httpx, where a post costs 1.1 ms of processor time: ten robots make 900
+a second.
 """
 
 import asyncio
@@ -66,7 +66,7 @@ class SubscribedEntity(Document):
 
 
 class SubscriptionCondition(Document):
-    """Changes that lead to a notification; of any attribute where none is named."""
+    """Attributes whose change leads to a notification; empty: any attribute."""
 
     attrs: tuple[str, ...] = ()
     notify_on_metadata_change: Literal[True] = True
@@ -132,7 +132,7 @@ def _read(raw: Mapping[str, Any]) -> SubscriptionDocument:
 
 
 class Subscription:
-    """One subscription, and how its notifications fared.
+    """One subscription, and the results of its notifications.
 
     Args:
         raw: The document of a ``POST``.
@@ -141,7 +141,7 @@ class Subscription:
 
     Attributes:
         sent: Number of its notifications; ``sent_at`` the moment of the last (Unix s).
-        fails: Notifications without a response since the last one with any.
+        fails: Notifications without a response since the last response.
         failure: Reason of the last, in libcurl's words; empty for none.
 
     Raises:
@@ -161,16 +161,16 @@ class Subscription:
 
     @property
     def receiver(self) -> Endpoint:
-        """Where its notifications go."""
+        """The receiver of its notifications."""
         notification = self.document.notification
-        found = notification.http or notification.http_custom
-        assert found is not None  # noqa: S101 - checked by the model
-        return found
+        endpoint = notification.http or notification.http_custom
+        assert endpoint is not None  # noqa: S101 - checked by the model
+        return endpoint
 
     def wants(self, entity: Entity, changed: Set[str], now: float) -> bool:
         """Whether a change of these attributes is to be notified.
 
-        What comes within the throttling of the last notification is never sent.
+        A change within the throttling of the last notification is never sent.
         """
         subject, throttling = self.document.subject, self.document.throttling or 0
         return (
@@ -207,7 +207,7 @@ class Subscription:
             self.fails = 0
 
     def close(self) -> None:
-        """Close the connections; what waits is lost."""
+        """Close the connections; waiting notifications are lost."""
         for lane in self._lanes.values():
             lane.close()
         self._lanes.clear()
@@ -219,20 +219,20 @@ class Subscription:
 
     def show(self) -> dict[str, Any]:
         """The subscription as a client gets it."""
-        shown = self.document.model_dump(mode="json", by_alias=True, exclude_none=True)
+        fields = self.document.model_dump(mode="json", by_alias=True, exclude_none=True)
         counters = {
             "timesSent": self.sent,
             "failsCounter": self.fails,
             "lastFailureReason": self.failure,
         }
-        shown["notification"] |= {key: fact for key, fact in counters.items() if fact}
-        return {"id": self.id, **shown}
+        fields["notification"] |= {key: fact for key, fact in counters.items() if fact}
+        return {"id": self.id, **fields}
 
 
 MOST_WAITING = 300
 """Capacity of one lane: ten seconds of one kind of a robot's measures at 30 Hz."""
 IDLE_S = 2.0
-"""A connection that was idle for longer is not used again: Node.js closes after 5 s."""
+"""Longest idle time of a kept connection (s): Node.js closes after 5 s."""
 
 _DEFAULT_TIMEOUT_MS = 5000
 _LENGTH = re.compile(rb"\r\ncontent-length: *(\d+)")
@@ -260,19 +260,19 @@ class Lane:
         self._task = self._loop.create_task(self._run(), name="embedded-notifications")
 
     def send(self, body: bytes) -> None:
-        """Queue one notification; of a full queue the oldest gives way."""
+        """Queue one notification; the oldest of a full queue gives way."""
         if self._waiting.full():
             self._waiting.get_nowait()
             self._subscription.ended(TIMED_OUT)
         self._waiting.put_nowait(body)
 
     def close(self) -> None:
-        """Close the connection; what waits is lost."""
+        """Close the connection; waiting notifications are lost."""
         self._task.cancel()
         self._hang_up()
 
     async def _run(self) -> None:
-        """Send what is queued, until cancelled."""
+        """Send queued notifications until cancelled."""
         limit_s = (self._receiver.timeout or _DEFAULT_TIMEOUT_MS) / 1000
         while True:
             body = await self._waiting.get()

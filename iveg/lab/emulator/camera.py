@@ -12,7 +12,7 @@ confidence, and that false boxes are less sure than true ones.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from iveg.domain.geometry import (
     PERSON_HEIGHT_M,
     Box3D,
     Pose2D,
-    box_of_a_person,
+    person_box,
     wrap_angle,
 )
 from iveg.domain.observations import Detection
@@ -43,16 +43,6 @@ class Counts:
         """Number of encounters with a target of the class."""
         return self.true_positives + self.false_negatives
 
-    @property
-    def miss_rate(self) -> float:
-        """Probability that an encounter is missed."""
-        return self.false_negatives / self.encounters
-
-    @property
-    def ghost_rate(self) -> float:
-        """Probability that an encounter brings a false box of the class."""
-        return self.false_positives / self.encounters
-
 
 FIELD_COUNTS: Mapping[str, Counts] = {
     PERSON: Counts(36, 6, 3),
@@ -71,10 +61,10 @@ class DetectorModel:
     Attributes:
         confidence: Mean over encounters (0 to 1); ``spread`` its deviation.
         flicker: Deviation from frame to frame.
-        ghost_confidence: How much less sure false boxes are.
+        ghost_confidence: Loss of confidence of false boxes (0 to 1).
         position: Deviation of a box for an encounter (m); ``jitter`` per frame (m).
         counts: By class; other classes have the counts of ``AGI``.
-        name: As its frames tell it; None: they do not.
+        name: Name in its frames; None: they have none.
     """
 
     confidence: float
@@ -101,9 +91,6 @@ DETECTORS: Mapping[str, DetectorModel] = {
 ROBOT_HEIGHT_M = 1.2
 
 
-_THING_RADIUS_M = 0.2
-
-
 @dataclass(frozen=True, slots=True)
 class Target:
     """An object that a detector may detect.
@@ -127,11 +114,6 @@ def person_target(number: int, person: Disc) -> Target:
     return Target(body.robot_id, PERSON, body, PERSON_HEIGHT_M)
 
 
-def thing_target(x: float, y: float) -> Target:
-    """A post or coat at a position in ``map`` (m), which is taken for a person."""
-    return replace(person_target(0, Disc(x, y, _THING_RADIUS_M)), key="thing")
-
-
 def robot_target(body: Body) -> Target:
     """A robot as a target: the class is its id, as in the paper."""
     return Target(body.robot_id, body.robot_id, body, ROBOT_HEIGHT_M)
@@ -146,9 +128,8 @@ _HIDDEN_LOSS = 0.15
 
 @dataclass(frozen=True, slots=True)
 class _Ghost:
-    """A false box at a position in ``map``."""
+    """A false box of a target's class, at a position in ``map``."""
 
-    class_id: str
     x: float
     y: float
     confidence: float
@@ -169,12 +150,12 @@ class EmulatedDetector:
     """Camera of one robot with its detector.
 
     Args:
-        profile: Where the camera sits and what it sees.
-        model: How good the network is.
+        profile: Mount, view and range of the camera.
+        model: Errors of the network.
         rng: Random source of its errors.
 
     Attributes:
-        name: Of the network, as its frames tell it.
+        name: Name of the network in its frames.
     """
 
     def __init__(
@@ -204,23 +185,24 @@ class EmulatedDetector:
             Boxes in ``base_link``.
         """
         camera = pose.compose(self._profile.camera)
-        drawn: list[Detection] = []
+        detections: list[Detection] = []
         for target in targets:
-            seen = self.part_seen(camera, target.body, scenery)
-            encounter = self._encounter(now, camera, target, seen > 0.0)
+            part = self.part_in_view(camera, target.body, scenery)
+            encounter = self._encounter(now, camera, target, part > 0.0)
             if encounter is None:
                 continue
-            if seen > 0.0 and not encounter.missed:
-                drawn.append(self._box(pose, target, encounter, seen))
+            if part > 0.0 and not encounter.missed:
+                detections.append(self._box(pose, target, encounter, part))
             if encounter.ghost is not None:
                 ghost = encounter.ghost
                 sure = self._probability(ghost.confidence)
-                drawn.append(_upright_box(pose, ghost.class_id, ghost.x, ghost.y, sure))
-        return tuple(drawn)
+                box = person_box(*pose.inverse(ghost.x, ghost.y))
+                detections.append(Detection(target.class_id, sure, box, "base_link"))
+        return tuple(detections)
 
-    # --- what is in view ----------------------------------------------------------
+    # --- view ---------------------------------------------------------------------
 
-    def part_seen(self, camera: Pose2D, body: Body, scenery: Scenery) -> float:
+    def part_in_view(self, camera: Pose2D, body: Body, scenery: Scenery) -> float:
         """Visible share of a target from ``camera``: 0, 1/3, 2/3 or 1."""
         x, y = body.pose.x, body.pose.y
         distance = camera.distance_to(x, y)
@@ -229,6 +211,7 @@ class EmulatedDetector:
         bearing = wrap_angle(math.atan2(y - camera.y, x - camera.x) - camera.yaw)
         if abs(bearing) > self._profile.camera_fov / 2:
             return 0.0
+        # Across the line of sight: the middle and almost both sides of the target.
         half = body.width / 2 / distance
         side_x, side_y = -(y - camera.y) * half, (x - camera.x) * half
         places = ((x + k * side_x, y + k * side_y) for k in (-0.9, 0.0, 0.9))
@@ -250,14 +233,14 @@ class EmulatedDetector:
         rng, model = self._rng, self._model
         counts = model.counts_of(target.class_id)
         until = now + rng.uniform(_SHORTEST_S, _LONGEST_S)
-        missed = rng.random() < counts.miss_rate
+        is_missed = rng.random() < counts.false_negatives / counts.encounters
         confidence = rng.normal(model.confidence, model.spread)
         x, y = rng.normal(0.0, model.position, 2)
-        has_ghost = rng.random() < counts.ghost_rate
-        ghost = self._draw_ghost(camera, target.class_id) if has_ghost else None
-        return _Encounter(until, missed, confidence, (float(x), float(y)), ghost)
+        has_ghost = rng.random() < counts.false_positives / counts.encounters
+        ghost = self._draw_ghost(camera) if has_ghost else None
+        return _Encounter(until, is_missed, confidence, (float(x), float(y)), ghost)
 
-    def _draw_ghost(self, camera: Pose2D, class_id: str) -> _Ghost:
+    def _draw_ghost(self, camera: Pose2D) -> _Ghost:
         half = self._profile.camera_fov / 2
         bearing = self._rng.uniform(-half, half)
         distance = self._rng.uniform(_GHOST_NEAR_M, _GHOST_FAR_M)
@@ -265,30 +248,22 @@ class EmulatedDetector:
             distance * math.cos(bearing), distance * math.sin(bearing)
         )
         mean = self._model.confidence - self._model.ghost_confidence
-        return _Ghost(class_id, x, y, self._rng.normal(mean, self._model.spread))
+        return _Ghost(x, y, self._rng.normal(mean, self._model.spread))
 
     # --- boxes --------------------------------------------------------------------
 
     def _box(
-        self, pose: Pose2D, target: Target, encounter: _Encounter, seen: float
+        self, pose: Pose2D, target: Target, encounter: _Encounter, part: float
     ) -> Detection:
         jitter = self._rng.normal(0.0, self._model.jitter, 2)
         moved = target.body.corners() + encounter.offset + jitter
         corners = [pose.inverse(float(x), float(y)) for x, y in moved]
         xs, ys = [x for x, _ in corners], [y for _, y in corners]
         box = Box3D(min(xs), max(xs), min(ys), max(ys), 0.0, target.height)
-        certainty = encounter.confidence - _HIDDEN_LOSS * (1.0 - seen)
+        certainty = encounter.confidence - _HIDDEN_LOSS * (1.0 - part)
         probability = self._probability(certainty)
         return Detection(target.class_id, probability, box, "base_link")
 
     def _probability(self, confidence: float) -> float:
         flickering = confidence + self._rng.normal(0.0, self._model.flicker)
         return float(min(max(flickering, 0.05), 0.99))
-
-
-def _upright_box(
-    pose: Pose2D, class_id: str, x: float, y: float, probability: float
-) -> Detection:
-    """A box of a person's size at a position in ``map``, given in ``base_link``."""
-    box = box_of_a_person(*pose.inverse(x, y))
-    return Detection(class_id, probability, box, "base_link")

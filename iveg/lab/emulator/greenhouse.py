@@ -20,11 +20,11 @@ from iveg.domain.witness import Plan
 
 Floats = NDArray[np.float64]
 Span = tuple[Floats, Floats]
-"""Where rays enter and leave (m); a ray that leaves before it enters misses."""
+"""Distances at which rays enter and leave (m); a ray that leaves first misses."""
 _LEANS_M, _TUFT_M = 0.2, 0.15
 """Farthest that a plant leans out, and the radius of its tuft (m)."""
 _LEAST_SLOPE = 1e-9
-"""Stands for zero in a direction, so that no division is by zero."""
+"""Replaces zero in a direction, so that no division is by zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,16 +72,17 @@ class Body:
         Returns:
             Distance (m, 0 inside) and the unit vector from the body to the point.
         """
-        ahead, left = self.pose.inverse(x, y)
-        out_x = ahead - min(max(ahead, -self.length / 2), self.length / 2)
+        front, left = self.pose.inverse(x, y)
+        out_x = front - min(max(front, -self.length / 2), self.length / 2)
         out_y = left - min(max(left, -self.width / 2), self.width / 2)
-        gap = math.hypot(out_x, out_y)
-        if gap == 0.0:
+        distance = math.hypot(out_x, out_y)
+        # Inside there is no direction away: to the side is the shortest way out.
+        if distance == 0.0:
             out_x, out_y = 0.0, math.copysign(1.0, left)
         size = math.hypot(out_x, out_y)
         out_x, out_y = out_x / size, out_y / size
         c, s = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
-        return gap, c * out_x - s * out_y, s * out_x + c * out_y
+        return distance, c * out_x - s * out_y, s * out_x + c * out_y
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,12 +105,12 @@ class Scenery:
     screens: tuple[Rectangle, ...]
 
     @classmethod
-    def of(
+    def from_greenhouse(
         cls, greenhouse: Greenhouse, rng: np.random.Generator | None = None
     ) -> "Scenery":
         """Arrays of a greenhouse; ``rng`` lets its plants lean."""
         screens = greenhouse.rows + tuple(thing.area for thing in greenhouse.obstacles)
-        plan = Plan.of(greenhouse)
+        plan = Plan.from_greenhouse(greenhouse)
         return cls(
             plan.bounds,
             plan.rectangles,
@@ -152,8 +153,8 @@ def _tufts(
 def slab_span(slope: Floats, low: Floats | float, high: Floats | float) -> Span:
     """Rays of a slope between two parallel planes."""
     steep = np.where(np.abs(slope) < _LEAST_SLOPE, _LEAST_SLOPE, slope)
-    one, other = low / steep, high / steep
-    return np.minimum(one, other), np.maximum(one, other)
+    at_low, at_high = low / steep, high / steep
+    return np.minimum(at_low, at_high), np.maximum(at_low, at_high)
 
 
 def box_span(rays: Floats, origin: Pose2D, boxes: Floats) -> Span:
@@ -236,7 +237,8 @@ def sweep(
 
 
 def _discs(sensor: Pose2D, model: LaserModel, discs: Floats, ranges: Floats) -> None:
-    """Shorten ``ranges`` by discs, shape (n, 3), for rays that can hit only."""
+    """Shorten ``ranges`` by discs, shape (n, 3)."""
+    # Only rays that can hit are computed: most discs take a few of 720.
     dx, dy = discs[:, 0] - sensor.x, discs[:, 1] - sensor.y
     distance = np.hypot(dx, dy)
     matters = (distance > discs[:, 2]) & (distance < model.range_max + discs[:, 2])

@@ -28,7 +28,7 @@ _ROUND_CORNERS = ((18.0, 2.0), (18.0, 18.0), (2.0, 18.0), (2.0, 2.0))
 _MOST_ON_THE_ROUND = 20
 _END_M, _KEEP_OFF_M = 0.5, 0.9
 _FIELD_LENGTH_M, _FIELD_WIDTH_M, _FIELD_PITCH_M = 25.0, 3.0, 20.0
-_MOST_WALKERS = 4
+_MOST_PEOPLE = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ def lay_out(
         robot_id: _up_and_down(lane, greenhouse)
         for robot_id, lane in zip(robots, lanes, strict=True)
     }
-    people = tuple(_beside(lane) for lane in lanes[:_MOST_WALKERS])
+    people = tuple(_beside(lane) for lane in lanes[:_MOST_PEOPLE])
     return Layout(scripts, profiles, people)
 
 
@@ -89,38 +89,41 @@ def _on_the_round(robots: Sequence[str]) -> dict[str, RobotScript]:
         reason = f"has room for {_MOST_ON_THE_ROUND} robots, not for {len(robots)}."
         raise DataFileError(TESTBED, "", reason)
     route = route_of(_ROUND_CORNERS, 2.3, True)
-    gap = len(route.points) / len(robots)
+    spacing = len(route.points) / len(robots)
     return {
         robot_id: RobotScript(
-            route.pose_at(int(place * gap)), _ROUND_CORNERS, 2.3, "patrol", cruise=0.6
+            route.pose_at(int(place * spacing)),
+            _ROUND_CORNERS,
+            2.3,
+            "patrol",
+            cruise=0.6,
         )
         for place, robot_id in enumerate(robots)
     }
 
 
 def _lanes_for(robots: Sequence[str], greenhouse: Greenhouse) -> list[Rectangle]:
-    """One lane for each robot: the one of its start, else the longest free one."""
+    """A lane for each robot: the lane of its start, else the longest free lane.
+
+    In an open field the lanes lie beside each other.
+    """
     if not greenhouse.lanes:
-        return [_lane_in_a_field(place) for place in range(len(robots))]
-    lanes = sorted((lane.area for lane in greenhouse.lanes), key=_long, reverse=True)
+        starts = [place * _FIELD_PITCH_M for place in range(len(robots))]
+        return [Rectangle(x, 0.0, x + _FIELD_WIDTH_M, _FIELD_LENGTH_M) for x in starts]
+    lanes = sorted(
+        (lane.area for lane in greenhouse.lanes),
+        key=lambda area: max(area.xmax - area.xmin, area.ymax - area.ymin),
+        reverse=True,
+    )
     if len(robots) > len(lanes):
         reason = f"has {len(lanes)} lanes, too few for {len(robots)} robots."
         raise DataFileError(f"greenhouse {greenhouse.name!r}", "", reason)
-    chosen = []
+    chosen_lanes = []
     for start in greenhouse.starts[: len(robots)]:
         here = [area for area in lanes if area.contains(start.x, start.y)]
-        chosen.append((here or lanes)[0])
-        lanes.remove(chosen[-1])
-    return [*chosen, *lanes][: len(robots)]
-
-
-def _lane_in_a_field(place: int) -> Rectangle:
-    x = place * _FIELD_PITCH_M
-    return Rectangle(x, 0.0, x + _FIELD_WIDTH_M, _FIELD_LENGTH_M)
-
-
-def _long(area: Rectangle) -> float:
-    return max(area.xmax - area.xmin, area.ymax - area.ymin)
+        chosen_lanes.append((here or lanes)[0])
+        lanes.remove(chosen_lanes[-1])
+    return [*chosen_lanes, *lanes][: len(robots)]
 
 
 def _ends(area: Rectangle, aside: float) -> tuple[tuple[float, float], ...]:

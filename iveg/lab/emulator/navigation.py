@@ -49,6 +49,7 @@ class Vehicle:
                 clip(command.angular_z, self.profile.max_turn),
                 _TURN_ACCELERATION * dt,
             )
+        # Along the heading of half the turn, or each turn would end beside its arc.
         middle = self.pose.yaw + turn * dt / 2
         self.pose = Pose2D(
             self.pose.x + speed * dt * math.cos(middle),
@@ -81,8 +82,8 @@ def clip(value: float, limit: float) -> float:
     return min(max(value, -limit), limit)
 
 
-def _towards(value: float, target: float, step: float) -> float:
-    return value + clip(target - value, step)
+def _towards(value: float, target: float, most: float) -> float:
+    return value + clip(target - value, most)
 
 
 @dataclass(slots=True)
@@ -97,40 +98,40 @@ class Odometer:
     Attributes:
         along: Standard deviation, part of the way driven; ``across`` likewise.
         turning: Standard deviation, part of the angle turned.
-        memory_m: Distance (m) over which an error decays; ``memory_rad`` likewise.
+        decay_m: Distance (m) over which an error decays; ``decay_rad`` likewise.
     """
 
     rng: np.random.Generator
     along: float = 0.02
     across: float = 0.01
     turning: float = 0.03
-    memory_m: float = 2.0
-    memory_rad: float = 1.0
+    decay_m: float = 2.0
+    decay_rad: float = 1.0
     _error: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
     def measure(self, truth: Pose2D, twist: Twist2D, dt: float) -> Pose2D:
         """The reported pose after moving with ``twist`` for ``dt`` (s)."""
         way, angle = abs(twist.linear_x) * dt, abs(twist.angular_z) * dt
-        self._walk(0, self.along, way, self.memory_m)
-        self._walk(1, self.across, way, self.memory_m)
-        self._walk(2, self.turning, angle, self.memory_rad)
+        self._walk(0, self.along, way, self.decay_m)
+        self._walk(1, self.across, way, self.decay_m)
+        self._walk(2, self.turning, angle, self.decay_rad)
         # Driving along a row also corrects the heading of a localizer.
-        self._error[2] *= math.exp(-way / self.memory_m)
+        self._error[2] *= math.exp(-way / self.decay_m)
         x, y = truth.transform(self._error[0], self._error[1])
         return Pose2D(x, y, wrap_angle(truth.yaw + self._error[2]))
 
-    def _walk(self, which: int, part: float, moved: float, memory: float) -> None:
+    def _walk(self, which: int, part: float, moved: float, decay: float) -> None:
         # Ornstein-Uhlenbeck over the distance, not over time; its deviation is
-        # part × memory, e.g. 2 % of 2 m = 4 cm.
-        keep = math.exp(-moved / memory)
-        spread = part * memory * math.sqrt(1.0 - keep * keep)
+        # part × decay, e.g. 2 % of 2 m = 4 cm.
+        keep = math.exp(-moved / decay)
+        spread = part * decay * math.sqrt(1.0 - keep * keep)
         fresh = float(self.rng.normal(0.0, spread)) if moved else 0.0
         self._error[which] = self._error[which] * keep + fresh
 
 
 _CELL_M = 0.25
 _MARGIN_M = 0.1
-"""Beside half the robot's width."""
+"""Room beside the robot on a way (m)."""
 _SNAP_M = 0.75
 _Cell = tuple[int, int]
 _Place = tuple[float, float]
@@ -164,7 +165,7 @@ def way_between(
 
 
 def _chain(cell: _Cell, came_from: Mapping[_Cell, _Cell]) -> Iterator[_Cell]:
-    """Cells between this one and the one that a search began at."""
+    """Cells between this cell and the first of the search."""
     while came_from[cell] != came_from[came_from[cell]]:
         cell = came_from[cell]
         yield cell
@@ -193,9 +194,9 @@ def _free_cells(scenery: Scenery, keep_off_m: float) -> dict[_Cell, _Place]:
 
 def _cell_near(places: Mapping[_Cell, _Place], place: _Place) -> _Cell | None:
     """The free cell nearest to a place, within 0.75 m."""
-    away = {cell: math.dist(centre, place) for cell, centre in places.items()}
-    nearest = min(away, key=lambda cell: away[cell], default=None)
-    return nearest if nearest and away[nearest] <= _SNAP_M else None
+    distances = {cell: math.dist(centre, place) for cell, centre in places.items()}
+    nearest = min(distances, key=lambda cell: distances[cell], default=None)
+    return nearest if nearest and distances[nearest] <= _SNAP_M else None
 
 
 _LOOK_AHEAD_M = 0.7
@@ -206,7 +207,7 @@ _ON_THE_SPOT = 0.9
 _COMFORT = 0.4
 """Deceleration that navigation plans (m/s²)."""
 CLEARANCE_M = 0.6
-"""Free distance ahead of the robot's front below which it waits (m)."""
+"""Free distance before the robot's front below which it waits (m)."""
 _SIDE_M = 0.15
 _HORIZON = 35
 
@@ -238,11 +239,10 @@ class Follower:
         """Whether the robot halts at a station."""
         return self._leaves_at is not None
 
-    def path(self, length_m: float = 12.0) -> tuple[tuple[float, float], ...]:
-        """The path ahead, one point per metre."""
-        count = round(length_m / SPACING_M)
-        ahead = self._route.ahead(self._index, count, self._direction)
-        return tuple((float(x), float(y)) for x, y in ahead[::10])
+    def path(self) -> tuple[tuple[float, float], ...]:
+        """The path of the next 12 m, one point per metre."""
+        points = self._route.points_from(self._index, 120, self._direction)
+        return tuple((float(x), float(y)) for x, y in points[::10])
 
     def requested_twist(
         self, pose: Pose2D, now: float, discs: Sequence[Disc]
@@ -257,18 +257,20 @@ class Follower:
         self._locate(pose)
         if self._halts(now):
             return Twist2D(0.0, 0.0)
-        ahead = self._route.ahead(self._index, _HORIZON, self._direction)
-        room = min(self._room(ahead, discs), self._way_to_halt() + CLEARANCE_M)
+        points = self._route.points_from(self._index, _HORIZON, self._direction)
+        room = min(self._room(points, discs), self._way_to_halt() + CLEARANCE_M)
+        # The speed from which it can halt in that room: v² = 2 a s.
         limit = math.sqrt(2.0 * _COMFORT * max(0.0, room - CLEARANCE_M))
-        return self._pursue(pose, ahead, min(self._cruise, limit))
+        return self._pursue(pose, points, min(self._cruise, limit))
 
     def _locate(self, pose: Pose2D) -> None:
-        window = self._route.ahead(self._index, _WINDOW, self._direction)
-        away = np.hypot(window[:, 0] - pose.x, window[:, 1] - pose.y)
-        passed = int(away.argmin())
+        window = self._route.points_from(self._index, _WINDOW, self._direction)
+        distances = np.hypot(window[:, 0] - pose.x, window[:, 1] - pose.y)
+        nearest = int(distances.argmin())
         index = self._index
-        for _ in range(passed):
+        for _ in range(nearest):
             index = (index + self._direction) % len(self._route.points)
+            # A late tick must not carry the robot past a station.
             if index in self._stations:
                 break
         self._index = index
@@ -286,6 +288,7 @@ class Follower:
         self._leaves_at = None
         if not self._route.closed and self._way_to_end() <= 2:
             self._direction = -self._direction
+        # Past the station, or the robot would halt there again.
         self._index = (self._index + 3 * self._direction) % len(self._route.points)
         return False
 
@@ -296,33 +299,34 @@ class Follower:
     def _way_to_halt(self) -> float:
         """Distance to the next station or end within the horizon (m)."""
         count = len(self._route.points)
-        for step in range(_HORIZON):
-            index = self._index + step * self._direction
-            ended = not self._route.closed and step >= self._way_to_end()
+        for passed in range(_HORIZON):
+            index = self._index + passed * self._direction
+            ended = not self._route.closed and passed >= self._way_to_end()
             if ended or index % count in self._stations:
-                return step * SPACING_M
+                return passed * SPACING_M
         return math.inf
 
-    def _room(self, ahead: Floats, discs: Sequence[Disc]) -> float:
-        """Free distance ahead of the robot's front (m)."""
+    def _room(self, points: Floats, discs: Sequence[Disc]) -> float:
+        """Free distance before the robot's front (m)."""
         if not discs:
             return math.inf
         half = self._profile.width / 2 + _SIDE_M
         places = np.array([(disc.x, disc.y, disc.radius) for disc in discs])
-        dx = ahead[:, 0:1] - places[:, 0]
-        dy = ahead[:, 1:2] - places[:, 1]
+        dx = points[:, 0:1] - places[:, 0]
+        dy = points[:, 1:2] - places[:, 1]
         blocked = (np.hypot(dx, dy) < half + places[:, 2]).any(axis=1)
         if not blocked.any():
             return math.inf
         way = int(blocked.argmax()) * SPACING_M
         return max(0.0, way + half - self._profile.length / 2)
 
-    def _pursue(self, pose: Pose2D, ahead: Floats, speed: float) -> Twist2D:
-        reach = min(round(_LOOK_AHEAD_M / SPACING_M), len(ahead) - 1)
-        x, y = ahead[reach]
+    def _pursue(self, pose: Pose2D, points: Floats, speed: float) -> Twist2D:
+        reach = min(round(_LOOK_AHEAD_M / SPACING_M), len(points) - 1)
+        x, y = points[reach]
         backwards = self._direction < 0 and self._profile.turning_radius > 0.0
         heading = pose.yaw + math.pi if backwards else pose.yaw
         aside = wrap_angle(math.atan2(y - pose.y, x - pose.x) - heading)
+        # An arc would sweep sideways into the crop.
         if self._profile.turning_radius == 0.0 and abs(aside) > _ON_THE_SPOT:
             return Twist2D(0.0, math.copysign(self._profile.max_turn * 0.8, aside))
         curvature = 2.0 * math.sin(aside) / max(pose.distance_to(x, y), 0.3)
@@ -359,10 +363,10 @@ class Navigator:
         """Drive to a goal; None: give it up and stand.
 
         Returns:
-            Whether a way there is known.
+            Whether it knows a way there.
         """
         if goal is None:
-            # On its own way again there is nothing to give up.
+            # On its own way the robot has nothing to give up.
             if self._goal is not None:
                 self._goal = self._follower = None
             return True
@@ -375,7 +379,7 @@ class Navigator:
         return True
 
     def _way_to(self, goal: Goal, pose: Pose2D, scenery: Scenery) -> Follower | None:
-        """The way to a goal and its end there; None where none is known."""
+        """The way to a goal and its end there; None: no way is known."""
         if self._profile.turning_radius > 0.0:
             route = self._script.route()
         else:
@@ -399,8 +403,7 @@ class Navigator:
         twist = self._follower.requested_twist(pose, now, discs)
         if self._goal is not None and self._follower.at_station:
             self._there_since = min(self._there_since, now)
-            is_over = now - self._there_since >= _STAYS_S
-            if self._goal.kind == "return" and is_over:
+            if self._goal.kind == "return" and now - self._there_since >= _STAYS_S:
                 self._goal, self._follower = None, self._own_work(pose)
         return twist
 
@@ -417,9 +420,9 @@ class Navigator:
 
 
 def _end_on(route: Route, goal: Goal) -> tuple[float, float]:
-    """Where a robot that comes along a route stops for a goal (m).
+    """Point at which a robot that comes along a route stops for a goal (m).
 
-    The last two points of an open one are its own ends, where followers turn round.
+    The last two points of an open route are left out: followers turn round there.
     """
     index, last = route.index_of(goal.x, goal.y), len(route.points) - 1
     if not route.closed:
@@ -429,7 +432,7 @@ def _end_on(route: Route, goal: Goal) -> tuple[float, float]:
 
 
 def _route_along(corners: Sequence[tuple[float, float]]) -> Route:
-    """A way as a route; one that ends where it begins has a point of each."""
+    """A way as a route of two points at least, also where start and end coincide."""
     x, y = corners[0]
     if corners[-1] == (x, y):
         corners = (x, y), (x + 0.01, y)

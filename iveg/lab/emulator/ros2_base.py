@@ -10,7 +10,6 @@ from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.goals import Goal
 from iveg.domain.observations import Detection
-from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.world import EmulatedSensors, RobotHardware, SimulatedWorld
 from iveg.robot.node import LONGEST_STEP_S, SLOTS, every, in_slots
 from iveg.robot.ros2.config import RobotConfig
@@ -59,7 +58,6 @@ class DriveWatchdog:
 
 
 _log = logging.getLogger(__name__)
-_SECOND = 1.0
 _LASER = "laser"
 _PUBLISHED = (
     *("odometry", "scan", "detections_3d", "path"),
@@ -76,9 +74,6 @@ class Ros2Base:
         network: DDS.
         config: Names of its topics and frames.
         rate_hz: Of odometry, laser and camera each.
-
-    Attributes:
-        started: Set when it has told where its sensors sit.
     """
 
     def __init__(
@@ -90,7 +85,6 @@ class Ros2Base:
         rate_hz: float,
     ) -> None:
         self.robot_id = rig.robot_id
-        self.started = asyncio.Event()
         self._rig, self._world = rig, world
         self._frames = config.frames
         self._rate_hz = rate_hz
@@ -119,16 +113,10 @@ class Ros2Base:
         """Drive and sense until cancelled; ``began`` is when the run began."""
         self._run_began = began
         self._publish("tf_static", self._mounts())
-        self.started.set()
         await asyncio.sleep(phase)
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(every(_SECOND, self._tell_slowly), name="slow")
-            slots = self._drive, self._scan, self._look
-            await in_slots(1.0 / self._rate_hz, slots)
-
-    def obey(self, order: FaultOrder) -> None:
-        """Execute the sensor faults of an order; the others concern its software."""
-        self._rig.obey(order)
+            tasks.create_task(every(1.0, self._tell_slowly), name="slow")
+            await in_slots(1.0 / self._rate_hz, (self._drive, self._scan, self._look))
 
     # --- the slots ----------------------------------------------------------------
 
@@ -142,7 +130,7 @@ class Ros2Base:
         wished = wished_twist(requested, command, now.mono)
         self._publish("cmd_vel_in", write_twist(wished))
         self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
-        self._tell_place(ros.Time.of(now.wall))
+        self._tell_place(ros.Time.from_seconds(now.wall))
 
     def _read_command(self, now: float) -> None:
         twist = self._newest(self._commands, ros.Twist)
@@ -185,7 +173,7 @@ class Ros2Base:
     def _scan(self, _: float) -> None:
         sweep = self._rig.scan(self._world)
         message = ros.LaserScan(
-            ros.Header(ros.Time.of(clock.wall()), _LASER),
+            ros.Header(ros.Time.from_seconds(clock.wall()), _LASER),
             sweep.angle_min,
             sweep.angle_min + sweep.angle_increment * (sweep.ranges.size - 1),
             sweep.angle_increment,
@@ -200,12 +188,12 @@ class Ros2Base:
     def _look(self, _: float) -> None:
         now = clock.now()
         frame = self._rig.detect(now.mono - self._run_began, self._world)
-        header = ros.Header(ros.Time.of(now.wall), self._frames.base_link)
-        seen = tuple(_detection(found, header) for found in frame.detections)
-        self._publish("detections_3d", ros.Detection3DArray(header, seen))
+        header = ros.Header(ros.Time.from_seconds(now.wall), self._frames.base_link)
+        boxes = tuple(_detection(box, header) for box in frame.detections)
+        self._publish("detections_3d", ros.Detection3DArray(header, boxes))
 
     def _tell_slowly(self, _: float) -> None:
-        header = ros.Header(ros.Time.of(clock.wall()), self._frames.map)
+        header = ros.Header(ros.Time.from_seconds(clock.wall()), self._frames.map)
         path = self._rig.navigation().path
         poses = tuple(
             ros.PoseStamped(header, _pose(Pose2D(x, y, 0.0))) for x, y in path
@@ -213,11 +201,11 @@ class Ros2Base:
         self._publish("path", ros.Path(header, poses))
         for reading in self._sensors.due(clock.mono() - self._run_began):
             for name, sensor in ROS_SENSORS.items():
-                if isinstance(reading, sensor.of):
+                if isinstance(reading, sensor.observation):
                     self._publish(name, sensor.write(header, reading))
 
     def _mounts(self) -> ros.TFMessage:
-        stamp = ros.Time.of(clock.wall())
+        stamp = ros.Time.from_seconds(clock.wall())
         laser = self._rig.profile.laser
         return ros.TFMessage((_link(stamp, self._frames.base_link, _LASER, laser),))
 
@@ -242,14 +230,14 @@ def _link(
     return ros.TransformStamped(ros.Header(stamp, outer), inner, transform)
 
 
-def _detection(found: Detection, header: ros.Header) -> ros.Detection3D:
-    box, (x, y, z) = found.box, found.box.centre
+def _detection(detection: Detection, header: ros.Header) -> ros.Detection3D:
+    box, (x, y, z) = detection.box, detection.box.centre
     size = ros.Vector3(box.xmax - box.xmin, box.ymax - box.ymin, box.zmax - box.zmin)
-    sure = ros.ObjectHypothesis(found.class_id, found.probability)
+    sure = ros.ObjectHypothesis(detection.class_id, detection.probability)
     centre = ros.Pose(ros.Point(x, y, z))
     return ros.Detection3D(
         header,
         (ros.ObjectHypothesisWithPose(sure, ros.PoseWithCovariance(centre)),),
         ros.BoundingBox3D(centre, size),
-        found.det_id or "",
+        detection.det_id or "",
     )

@@ -1,6 +1,4 @@
-"""Named runs as data: routes of robots and rounds of people.
-
-What each shows is in ``docs/emulator.md``.
+"""Named runs as data: routes of robots and rounds of people (``docs/emulator.md``).
 
 All but ``nlos-field`` are written for the testbed of the paper (``mvsim-20x20``):
 corridors lie at x = 2, 6, 10, 14, 18 m, crop between them at x = 4, 8, 12, 16 m from
@@ -85,13 +83,14 @@ class SimulatedPerson:
     def _give_way(
         self, move_x: float, move_y: float, dt: float, robot: Body
     ) -> tuple[float, float]:
-        gap, out_x, out_y = robot.gap_to(self.x, self.y)
-        near = _KEEPS_OFF_M + PERSON_RADIUS_M - gap
+        distance, out_x, out_y = robot.gap_to(self.x, self.y)
+        near = _KEEPS_OFF_M + PERSON_RADIUS_M - distance
         if near <= 0.0:
             return move_x, move_y
         inward = move_x * out_x + move_y * out_y
         if inward < 0.0:
             move_x, move_y = self._slide(move_x, move_y, out_x, out_y)
+        # No faster than somebody steps: a fast robot still comes near.
         push = min(near, _STEP_ASIDE_SPEED * dt)
         return move_x + out_x * push, move_y + out_y * push
 
@@ -155,22 +154,21 @@ class Route:
 
     def index_of(self, x: float, y: float) -> int:
         """The point nearest to a position."""
-        away = np.hypot(self.points[:, 0] - x, self.points[:, 1] - y)
-        return int(away.argmin())
+        return int(np.hypot(self.points[:, 0] - x, self.points[:, 1] - y).argmin())
 
     def pose_at(self, index: int) -> Pose2D:
         """Pose of a robot on point ``index`` that looks along the route."""
-        (ax, ay), (bx, by) = self.ahead(index, 2)
+        (ax, ay), (bx, by) = self.points_from(index, 2)
         return Pose2D(float(ax), float(ay), math.atan2(by - ay, bx - ax))
 
-    def ahead(self, index: int, count: int, direction: int = 1) -> Floats:
+    def points_from(self, index: int, count: int, direction: int = 1) -> Floats:
         """``count`` points from ``index`` on, fewer at the end of an open route."""
         wanted = index + direction * np.arange(count)
         if self.closed:
             wanted %= len(self.points)
         inside = (wanted >= 0) & (wanted < len(self.points))
-        found: Floats = self.points[wanted[inside]]
-        return found
+        points: Floats = self.points[wanted[inside]]
+        return points
 
 
 def route_of(
@@ -210,8 +208,7 @@ def _bend(before: Floats, corner: Floats, after: Floats, radius: float) -> Float
 def _even(points: Floats, closed: bool) -> Floats:
     """Space the points of a line evenly."""
     line = np.concatenate((points, points[:1])) if closed else points
-    steps = np.hypot(*np.diff(line, axis=0).T)
-    along = np.concatenate(((0.0,), np.cumsum(steps)))
+    along = np.concatenate(((0.0,), np.cumsum(np.hypot(*np.diff(line, axis=0).T))))
     count = max(2, round(along[-1] / SPACING_M))
     places = np.linspace(0.0, along[-1], count, endpoint=not closed)
     x = np.interp(places, along, line[:, 0])
@@ -334,7 +331,7 @@ _PICKER_IN_5 = (
     WalkStop(19.2, 13.0, 4.0, 10.0),
     WalkStop(19.2, 10.0, 4.0, 10.0),
 )
-_WALKER_IN_2 = (
+_VISITOR_IN_2 = (
     WalkStop(4.7, 2.8, 2.0, 5.0),
     WalkStop(4.7, 8.0, 3.0, 8.0),
     WalkStop(4.7, 15.0, 3.0, 8.0),
@@ -349,7 +346,7 @@ _CARRIER = (
     WalkStop(8.7, 3.0),
     WalkStop(8.7, 17.2),
 )
-_FOUR_PEOPLE = (_PICKER_IN_3, _WALKER_IN_2, _PICKER_IN_5, _CARRIER)
+_FOUR_PEOPLE = (_PICKER_IN_3, _VISITOR_IN_2, _PICKER_IN_5, _CARRIER)
 _STANDER = (WalkStop(10.0, 10.0, 60.0, 60.0),)
 _AT_THE_END = (WalkStop(11.9, 17.2, 60.0, 60.0),)
 _CROSSER = (WalkStop(8.6, 10.0, 1.0, 3.0), WalkStop(11.4, 10.0, 1.0, 3.0))

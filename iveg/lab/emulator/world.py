@@ -1,4 +1,4 @@
-"""Simulated world: robots and people, each robot's sensor values, and what is true."""
+"""Simulated world: robots and people, each robot's sensor values, and the truth."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -22,18 +22,15 @@ from iveg.domain.observations import (
     Origin,
 )
 from iveg.lab.emulator.camera import (
-    PERSON,
     DetectorModel,
     EmulatedDetector,
     Target,
     person_target,
     robot_target,
-    thing_target,
 )
 from iveg.lab.emulator.greenhouse import Body, Disc, LaserModel, Scenery, sweep
 from iveg.lab.emulator.layout import Layout
 from iveg.lab.emulator.navigation import Navigator, Odometer, Vehicle
-from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.scenarios import RobotScript, SimulatedPerson
 
 _BATTERY_LASTS_S = 8 * 3600.0
@@ -65,7 +62,7 @@ class EmulatedSensors:
             every_s = kind.sensor.every_s if kind.sensor else 0.0
             if now - self._sent_at.get(kind.name, -every_s) >= every_s:
                 self._sent_at[kind.name] = now
-                yield EMULATED[kind.of](now)
+                yield EMULATED[kind.type_](now)
 
 
 _LASER = LaserModel()
@@ -77,7 +74,6 @@ class RobotHardware:
     Attributes:
         command: Last command of the drive.
         detector: Camera and detector.
-        faults: Faults in force; those of the camera show here.
     """
 
     def __init__(
@@ -91,7 +87,6 @@ class RobotHardware:
         self.robot_id = robot_id
         self.profile = profile
         self.command = REST
-        self.faults = FaultOrder(robot=robot_id)
         self._rng = rng
         self._odometer = Odometer(rng)
         self.detector = EmulatedDetector(profile, detector, rng)
@@ -109,10 +104,6 @@ class RobotHardware:
         truth, twist = self.vehicle.pose, self.vehicle.twist
         self._believed = self._odometer.measure(truth, twist, dt)
 
-    def obey(self, order: FaultOrder) -> None:
-        """Take the faults of an order."""
-        self.faults = self.faults.changed_by(order)
-
     def requested_twist(self, now: float, around: "SimulatedWorld") -> Twist2D:
         """Twist that navigation requests; ``now`` in seconds into the run."""
         discs = around.discs()
@@ -121,7 +112,7 @@ class RobotHardware:
         return self._navigator.requested_twist(self.vehicle.pose, now, discs)
 
     def pursue(self, goal: Goal | None, around: "SimulatedWorld") -> bool:
-        """Drive to a goal, or give it up; whether a way there is known."""
+        """Drive to a goal, or give it up; returns whether a way there is known."""
         return self._navigator.pursue(goal, self.vehicle.pose, around.scenery)
 
     # --- sensors ------------------------------------------------------------------
@@ -153,14 +144,9 @@ class RobotHardware:
 
     def detect(self, now: float, around: "SimulatedWorld") -> DetectionFrame:
         """One frame of camera and detector; empty when nothing is seen."""
-        pose, faults = self.vehicle.pose, self.faults
-        targets = around.targets_for(self.robot_id)
-        if faults.hide_people:
-            targets = [target for target in targets if target.class_id != PERSON]
-        if faults.thing is not None:
-            targets.append(thing_target(faults.thing.x, faults.thing.y))
-        found = self.detector.detect(now, pose, targets, around.scenery)
-        return DetectionFrame(self.robot_id, Origin(), found, (), self.detector.name)
+        pose, targets = self.vehicle.pose, around.targets_for(self.robot_id)
+        boxes = self.detector.detect(now, pose, targets, around.scenery)
+        return DetectionFrame(self.robot_id, Origin(), boxes, (), self.detector.name)
 
     def navigation(self) -> Navigation:
         """The intent: task, goal and path."""
@@ -188,7 +174,7 @@ class SimulatedWorld:
             len(layout.robots) + len(layout.people) + 1
         )
         generators = [np.random.default_rng(stream) for stream in streams]
-        self.scenery = Scenery.of(greenhouse, generators.pop())
+        self.scenery = Scenery.from_greenhouse(greenhouse, generators.pop())
         self.rigs: Mapping[str, RobotHardware] = {
             robot_id: RobotHardware(
                 robot_id,
@@ -232,46 +218,34 @@ class SimulatedWorld:
         return people + [robot_target(body) for body in self.bodies_but(robot_id)]
 
 
-@dataclass(frozen=True, slots=True)
-class Driving:
-    """Permission of a robot to drive.
-
-    Attributes:
-        wanted: Speed that its navigation asks for (m/s); 0 while it is held.
-        factor: Greatest share of it that its own safety machine allows (0 to 1).
-    """
-
-    wanted: float
-    factor: float
-
-
 def in_view(
     rig: RobotHardware, world: SimulatedWorld
 ) -> Iterator[tuple[Target, float]]:
     """Targets in view of a robot's camera, with the visible share (0 to 1)."""
     camera = rig.vehicle.pose.compose(rig.profile.camera)
     for target in world.targets_for(rig.robot_id):
-        part = rig.detector.part_seen(camera, target.body, world.scenery)
+        part = rig.detector.part_in_view(camera, target.body, world.scenery)
         if part > 0.0:
             yield target, part
 
 
 def true_picture(
-    rig: RobotHardware, world: SimulatedWorld, at: float, driving: Driving
+    rig: RobotHardware, world: SimulatedWorld, at: float, wanted: float, factor: float
 ) -> dict[str, object]:
     """The truth of one picture.
 
     ``{"robot", "at": Unix s, "pose": {"x", "y", "yaw"}, "speed", "wanted", "factor",
     "visible": [{"key", "class", "x", "y", "part"}], "people": [{"key", "x", "y"}]}``:
-    the robot's true pose in ``map`` (m, rad) and speed (m/s), ``Driving``, all targets
-    of which a part (0 to 1) is in its view, and every person in the greenhouse, by
-    their true positions, whatever the detector reports.
+    the robot's true pose in ``map`` (m, rad) and speed (m/s), its speed limits, all
+    targets with their part (0 to 1) in its view, and every person in the greenhouse, by
+    their true positions, independent of the detector.
 
     Args:
-        rig: The robot whose picture it is.
-        world: Everybody.
+        rig: The robot that took the picture.
+        world: All robots and people.
         at: When the picture was taken (Unix s, by the robot's own clock).
-        driving: How it may drive then.
+        wanted: Speed that its navigation asks for (m/s); 0 while it is held.
+        factor: Greatest share of it that its own safety machine allows (0 to 1).
     """
     pose = rig.vehicle.pose
     return {
@@ -279,8 +253,8 @@ def true_picture(
         "at": at,
         "pose": {**_place(pose), "yaw": round(pose.yaw, 4)},
         "speed": round(rig.vehicle.twist.linear_x, 3),
-        "wanted": round(driving.wanted, 3),
-        "factor": driving.factor,
+        "wanted": round(wanted, 3),
+        "factor": factor,
         "visible": [
             {
                 "key": target.key,

@@ -1,8 +1,8 @@
 """Times of each message, read at the broker and at Orion by a recorder of our own.
 
-iVeg reads the broker every few hundredths of a second and skips what is old; Orion's
-copy is often there before.  Here every message is read at once, from the agent's own
-topics and by subscriptions of our own at Orion, and decoded when the run is over.
+iVeg reads the broker every few hundredths of a second and skips old messages; Orion's
+copy often comes first.  Here every message is read at once, from the agent's own topics
+and by separate subscriptions at Orion, and decoded when the run is over.
 """
 
 import asyncio
@@ -10,15 +10,17 @@ import contextlib
 import threading
 from collections.abc import AsyncIterator, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from http import HTTPStatus
 from typing import Final
 
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
 
 from iveg.adapters import clock
-from iveg.adapters.orion import OrionClient
-from iveg.adapters.post_listener import post_listener
+from iveg.adapters.orion import SUBSCRIPTIONS, OrionClient
 from iveg.adapters.reconciler import (
     ALL_ROBOTS,
     WantedSubscription,
@@ -28,8 +30,9 @@ from iveg.cli.nodes import broker_of
 from iveg.domain.clock_offset import LONGEST_S, STAMP_S
 from iveg.domain.errors import HopError, UnreadableError
 from iveg.domain.kinds import MEASURED
-from iveg.domain.latency import DATA, Data, Segment, data_of
+from iveg.domain.latency import DATA, DATA_OF, Data, Segment
 from iveg.domain.observations import kind_of
+from iveg.lab.embedded.server import http_server
 from iveg.ngsi import codec, names
 from iveg.settings import Settings
 
@@ -39,14 +42,14 @@ HOPS: Final[tuple[Segment, ...]] = ("uplink", "fiware", "robot_orion")
 
 @dataclass(frozen=True, slots=True)
 class MessageTimes:
-    """One message at the places that it passed, all by one clock (Unix s).
+    """Times of one message at the places on its way, all by one clock (Unix s).
 
-    Two are equal if they are of one message.
+    Times of the same message are equal.
 
     Attributes:
-        stamp: As the robot stamped it; None: it did not.
-        broker: When the broker had passed it on.
-        orion: When Orion's notification was here; None: it never came.
+        stamp: The robot's stamp; None: there is none.
+        broker: Time at which the broker passed it on.
+        orion: Time at which Orion's notification came; None: it never came.
     """
 
     robot_id: str
@@ -61,7 +64,7 @@ class MessageTimes:
     def hops(self) -> dict[Segment, float] | None:
         """Δt₁, Δt₂ and their sum (s); None where Orion's copy was first or never came.
 
-        What was stamped later than it came, or a minute before, does not count.
+        A stamp later than the message, or a minute before it, does not count.
         """
         if self.stamp is None or self.orion is None:
             return None
@@ -97,7 +100,7 @@ def hops_of(times: Iterable[MessageTimes]) -> dict[Data, dict[Segment, list[floa
 
 
 DESCRIPTION: Final = "iVeg experiment, times of messages"
-"""Description of its subscriptions; iVeg leaves alone those that begin otherwise."""
+"""Description of its subscriptions, which iVeg does not take for its own."""
 LAST_COPIES_S: Final = 2.0
 """Wait for Orion's copies of the last messages (s)."""
 _SUBSCRIBED_WITHIN_S = 5.0
@@ -105,10 +108,10 @@ _HOST = "127.0.0.1"
 
 
 class MessageRecorder:
-    """Holds what was read, and when; decodes it when asked."""
+    """Messages with their times; they are decoded after the run."""
 
     def __init__(self) -> None:
-        # Steps of the wall clock must not get between two readings.
+        # Jumps of the wall clock must not come between two readings.
         self._since = clock.wall() - clock.mono()
         self._published: list[tuple[float, str, bytes]] = []
         self._notified: list[tuple[float, bytes]] = []
@@ -117,38 +120,37 @@ class MessageRecorder:
         """Note a message that the broker has passed on."""
         self._published.append((self._since + clock.mono(), topic, payload))
 
-    def take_notification(self, body: bytes) -> tuple[HTTPStatus, str]:
+    def take_notification(self, body: bytes) -> None:
         """Note a notification that Orion has posted."""
         self._notified.append((self._since + clock.mono(), body))
-        return HTTPStatus.NO_CONTENT, ""
 
     def times(self, begin: float, end: float) -> list[MessageTimes]:
         """Messages that were at the broker within a time (Unix s), in that order."""
-        found: dict[MessageTimes, MessageTimes] = {}
+        known: dict[MessageTimes, MessageTimes] = {}
         for at, topic, payload in self._published:
             if begin <= at < end:
                 read = codec.read_measure(topic.split("/")[2], payload)
                 for message in _messages_in(read):
-                    found.setdefault(message, replace(message, broker=at))
+                    known.setdefault(message, replace(message, broker=at))
         for at, body in self._notified:
             with contextlib.suppress(UnreadableError):
                 for message in _messages_in(codec.read_notification(body)[1]):
-                    known = found.get(message)
-                    if known is not None and known.orion is None:
-                        found[message] = replace(known, orion=at)
-        return list(found.values())
+                    earlier = known.get(message)
+                    if earlier is not None and earlier.orion is None:
+                        known[message] = replace(earlier, orion=at)
+        return list(known.values())
 
 
 def _messages_in(read: codec.ReadResult) -> Iterator[MessageTimes]:
-    """The messages of a reading that count themselves; times are not known yet."""
+    """The counted messages of a reading, without their times."""
     for observation in read.observations:
-        data, origin = data_of(kind_of(observation)), observation.origin
+        data, origin = DATA_OF.get(kind_of(observation)), observation.origin
         if data is not None and origin.boot is not None and origin.seq is not None:
             robot_id: str = observation.robot_id
             yield MessageTimes(robot_id, data, origin.boot, origin.seq, origin.stamp_s)
 
 
-# --- where it reads -------------------------------------------------------------------
+# --- recording ------------------------------------------------------------------------
 
 
 @contextlib.asynccontextmanager
@@ -162,7 +164,7 @@ async def recorder(settings: Settings) -> AsyncIterator[MessageRecorder]:
     tenant = settings.fiware_service, settings.fiware_servicepath
     async with (
         _reading(settings, recorded),
-        post_listener(recorded.take_notification, _HOST) as port,
+        http_server(_listener(recorded), _HOST, 0) as port,
         OrionClient(settings.orion_url, *tenant) as orion,
     ):
         subscribed = [
@@ -173,13 +175,23 @@ async def recorder(settings: Settings) -> AsyncIterator[MessageRecorder]:
             yield recorded
         finally:
             for subscription_id in subscribed:
-                await orion.delete_subscription(subscription_id)
+                await orion.delete(f"{SUBSCRIPTIONS}/{subscription_id}")
+
+
+def _listener(recorded: MessageRecorder) -> Starlette:
+    """Application that takes notifications."""
+
+    async def take(request: Request) -> Response:
+        recorded.take_notification(await request.body())
+        return Response(status_code=204)
+
+    return Starlette(routes=[Route("/", take, methods=["POST"])])
 
 
 def _subscriptions(url: str) -> Iterator[dict[str, object]]:
     """One for each kind of data: each notification has one message."""
     for kind in MEASURED:
-        if data_of(kind.of) is not None:
+        if kind.type_ in DATA_OF:
             attributes = tuple(name for name, _ in kind.attributes)
             wanted = WantedSubscription("", ALL_ROBOTS, attributes)
             yield {
@@ -194,7 +206,7 @@ async def _reading(
 ) -> AsyncIterator[None]:
     """Read the agent's own topics at the broker, in a thread of its own.
 
-    A message has its time as soon as it is read, before any of Orion's that wait.
+    So a message has its time at once, even while Orion's copies wait for the loop.
     """
     address, stands = broker_of(settings), threading.Event()
     topic = names.measure_topic(settings.apikey, "+")

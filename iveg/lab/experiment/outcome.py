@@ -14,7 +14,7 @@ import os
 import platform
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from statistics import fmean
 from typing import Any, Final
@@ -22,7 +22,7 @@ from typing import Any, Final
 import orjson
 
 from iveg import __version__
-from iveg.domain.latency import DATA, Place
+from iveg.domain.latency import DATA
 from iveg.domain.records import Json
 from iveg.lab.experiment.messages import HOPS, counts_of, hops_of
 from iveg.lab.experiment.plan import ExperimentPlan, PlannedRun, write_json
@@ -41,63 +41,6 @@ from iveg.lab.experiment.stage import (
 )
 
 CLASSES: Final = ("farmer", "AGI", "AGII")
-COMPLETION: Final[Mapping[Place, float]] = {"simulation": 0.92, "field": 0.82}
-"""Completed share of its runs."""
-CONFIDENCE: Final[Mapping[Place, float]] = {"simulation": 0.85, "field": 0.72}
-"""Mean confidence of its detector."""
-P95_BELOW_MS: Final[Mapping[Place, float]] = {"simulation": 202.0, "field": 320.0}
-"""P95 that it states for every kind of data from robot to Orion (ms)."""
-
-
-@dataclass(frozen=True, slots=True)
-class PaperScore:
-    """One row: counts, then precision and recall in per cent, then AP@0.5."""
-
-    tp: int
-    fp: int
-    fn: int
-    precision: float
-    recall: float
-    ap: float | None
-
-
-PRINTED: Final[Mapping[Place, Mapping[str, PaperScore]]] = {
-    "simulation": {
-        "farmer": PaperScore(42, 3, 1, 93.33, 97.67, 0.94),
-        "AGI": PaperScore(18, 2, 2, 88.89, 92.52, 0.92),
-        "AGII": PaperScore(28, 4, 3, 87.50, 87.56, 0.88),
-    },
-    "field": {
-        "farmer": PaperScore(36, 6, 3, 85.71, 92.31, 0.94),
-        "AGI": PaperScore(34, 8, 5, 80.95, 87.18, 0.88),
-        "AGII": PaperScore(28, 12, 8, 70.00, 77.78, 0.88),
-    },
-}
-GLOBAL: Final[Mapping[Place, PaperScore]] = {
-    "simulation": PaperScore(88, 7, 6, 90.05, 92.70, None),
-    "field": PaperScore(98, 26, 16, 79.03, 85.96, None),
-}
-"""Its row "Total (global)"."""
-MEANS: Final[Mapping[Place, tuple[float, float, float]]] = {
-    "simulation": (89.90, 92.58, 0.91),
-    "field": (78.89, 85.76, 0.90),
-}
-"""Its row "Average (mean)": precision, recall (%), AP."""
-AGAINST_ITS_TEXT: Final = (
-    "Five simulations in each of four scenarios are 20 runs; 18 completed are 90 %, "
-    "not the 92 % that the text says.",
-    "The text calls 90.05 % the global precision in simulation; 88 TP with the 7 FP of "
-    "that row are 92.63 %, with the 9 FP of its rows 90.72 %. The loss of 11.02 % from "
-    "simulation to field rests on it.",
-    "The recalls of AGI and AGII are those of the classes that were looked for; the "
-    "text reads them as recalls of the cameras that AGI and AGII carry.",
-    "Total P95 is the sum of two P95, which is more than the P95 of the sums: what "
-    "iVeg tells as total was measured from end to end.",
-    "Δt₂ in the field rests on 598 polls of Orion, Δt₁ on more than 10,000 messages a "
-    "kind of data.",
-)
-"""Contradictions between the paper's tables and text (docs/experiment.md)."""
-
 Outcome = dict[str, Any]
 
 
@@ -107,7 +50,7 @@ def counted_of(run: VirtualRecording) -> Outcome:
     return {
         "pictures": len(run.reported),
         "classes": tally(zip(truth, run.reported, strict=True)),
-        "protection": protection_of(moments_of(run.truth, run.foretold)),
+        "protection": protection_of(moments_of(run.truth, run.encounters)),
     }
 
 
@@ -164,12 +107,12 @@ def _protection(outcomes: Sequence[Outcome]) -> Iterator[dict[str, object]]:
     """Numbers of the scenarios, then of each profile and rule."""
     groups: dict[tuple[str, str, str], list[Protection]] = {}
     for run in sorted(outcomes, key=lambda run: run["timed"] is None):
-        where = run["family"] if run["timed"] is None else "scenarios"
-        chosen = where, run["profile"], run["rule"]
-        groups.setdefault(chosen, []).append(run["counted"]["protection"])
-    for (where, profile, rule), runs in groups.items():
+        group = run["family"] if run["timed"] is None else "scenarios"
+        key = group, run["profile"], run["rule"]
+        groups.setdefault(key, []).append(run["counted"]["protection"])
+    for (group, profile, rule), runs in groups.items():
         numbers = total_of(runs).row()
-        yield {"where": where, "profile": profile, "rule": rule, **numbers}
+        yield {"where": group, "profile": profile, "rule": rule, **numbers}
 
 
 def _scored(classes: Sequence[str], runs: Sequence[Outcome]) -> dict[str, object]:
@@ -221,7 +164,7 @@ def write_raw(
     directory.mkdir(parents=True)
     _write_rows(directory / "truth.ndjson", virtual.truth)
     _write_rows(directory / "reported.ndjson", virtual.reported)
-    _write_rows(directory / "encounters.ndjson", virtual.foretold)
+    _write_rows(directory / "encounters.ndjson", virtual.encounters)
     kept = ("family", "number", "seed", "profile", "rule")
     document: dict[str, object] = {name: outcome[name] for name in kept}
     if real is not None:

@@ -19,7 +19,7 @@ ROBOTS: Final = ("AGI", "AGII")
 GREENHOUSE: Final = "mvsim-20x20"
 SEED: Final = 2026
 PEOPLED: Final = "demo"
-"""Scenario of the runs that only protection is scored on: four people at work."""
+"""Scenario of the runs for protection alone: four people at work."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class PlannedRun:
         seconds: Duration in real time, through all programs (s); 0: not at all.
         counted_s: Duration on the virtual clock, which gives the counts (s).
         seed: Random seed of its people and its detector's noise.
-        profile: Of the emulated detector; ``rule`` that robots are slowed by.
+        profile: Profile of the emulated detector; ``rule``: rule that slows robots.
     """
 
     family: str

@@ -1,14 +1,14 @@
-"""Protection: were people near a moving robot protected, scored against the truth.
+"""Protection of people near a moving robot, scored against the truth.
 
-It looks from outside: where robots and people really are, what a camera really has in
-view, how fast a robot may drive by its own safety machine.  What iVeg believed, decided
-or published does not count, except for when it published an encounter.
+Only the truth counts: true places of robots and people, true views of cameras, and the
+speed that a robot's own safety machine allows.  Of iVeg itself only the time at which
+it published an encounter counts.
 
 *Near* is within two metres of a robot that moves; an *encounter* is one robot near one
 person in view of some camera, without a pause of a second; its *delay* is the time
-from there until the robot is limited to half speed.  An *entry* is a zone that a robot
-reaches, or is reached by, around somebody who has been in view for two seconds; later
-glimpses leave nobody the time to slow before.
+from there until the robot is limited to half speed.  An *entry* is the moment at which
+a robot and the zone of a person meet, if the person has been in view for two seconds:
+later glimpses leave no time to slow before.
 
 A person is in view where the newest picture of some robot has them, if it is not older
 than a quarter of a second: robots take theirs at different times.
@@ -17,7 +17,7 @@ than a quarter of a second: robots take theirs at different times.
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import groupby
+from itertools import chain, groupby
 from math import dist, inf
 from operator import attrgetter, itemgetter
 from statistics import quantiles
@@ -33,26 +33,26 @@ SIGHTS: Final[tuple[Sight, ...]] = get_args(Sight)
 NEAR_M = 2.0
 """The zone of the rule (m)."""
 AWAY_M = 4.0
-"""Slowed with nobody so near is needless (m)."""
+"""A limit with nobody this near is needless (m)."""
 MOVES_M_S = 0.05
 AHEAD_S = 1.5
-"""So long before its entry an encounter should be published (s)."""
+"""Lead that a published encounter should have over the entry (s)."""
 ROUNDING_S = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class NearPerson:
-    """A person as one robot has them about it.
+    """A person near one robot.
 
     Attributes:
         distance_m: From the robot's ``base_link`` to the person.
-        foretold: iVeg publishes an encounter of this robot with the person.
+        has_encounter: iVeg publishes an encounter of this robot with the person.
     """
 
     name: str
     distance_m: float
     sight: Sight
-    foretold: bool = False
+    has_encounter: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class NearMoment:
     Attributes:
         at: (s); ``lasts_s`` for how long it counts.
         speed: True speed (m/s).
-        wanted: Speed that it would drive if nothing limited it (m/s).
+        wanted: Speed that it would drive without limits (m/s).
         factor: Greatest speed factor that its own safety machine allows.
         people: Everybody in the greenhouse.
     """
@@ -90,12 +90,12 @@ class Protection:
     """Sums over a run, or over several.
 
     Attributes:
-        driven_s: Robots moved.
+        driven_s: Time for which robots moved.
         near_s: Person-seconds near a moving robot, by ``Sight``; ``slowed_s`` of them
             while it was limited.
-        needless_s: A moving robot was limited with nobody near at all.
-        delays_s: Of each encounter; None: the robot was never limited.
-        foretold_s: Of each entry, for how long iVeg had published it; None: it had not.
+        needless_s: Time for which a moving robot was limited with nobody near.
+        delays_s: Delay of each encounter; None: the robot was never limited.
+        foretold_s: Of each entry, time since iVeg published it; None: it had not.
     """
 
     driven_s: float = 0.0
@@ -111,7 +111,7 @@ class Protection:
         by_sight = {
             sight: share(self.slowed_s[sight], self.near_s[sight]) for sight in SIGHTS
         }
-        foretold = sum((s or 0.0) >= AHEAD_S - ROUNDING_S for s in self.foretold_s)
+        in_time = sum((s or 0.0) >= AHEAD_S - ROUNDING_S for s in self.foretold_s)
         return {
             "near_s": {sight: round(self.near_s[sight], 2) for sight in SIGHTS},
             "slowed": {**by_sight, "all": share(slowed, near)},
@@ -120,7 +120,7 @@ class Protection:
             "delay_p95_s": p95([s for s in self.delays_s if s is not None]),
             "needless": share(self.needless_s, self.driven_s),
             "entries": len(self.foretold_s),
-            "foretold": share(foretold, len(self.foretold_s)),
+            "foretold": share(in_time, len(self.foretold_s)),
         }
 
 
@@ -151,9 +151,9 @@ def p95(values: Sequence[float]) -> float | None:
 
 
 _STILL_S: Final = 0.25
-"""Time for which a picture, or a gap between two, counts (s)."""
+"""Time for which a picture counts, or the time between two (s)."""
 _SAME_M: Final = 1.0
-"""Farthest that iVeg may have somebody from where they are (m)."""
+"""Greatest error of the place at which iVeg has a person (m)."""
 
 
 def moments_of(
@@ -164,7 +164,7 @@ def moments_of(
     Args:
         truth: Rows of the truth.
         encounters: With people, as iVeg published them: ``robot``, ``at``, ``people``
-            (each the place ``x``, ``y`` where iVeg has somebody), at the same times.
+            (each a place ``x``, ``y`` at which iVeg has a person), at the same times.
     """
     people_at = {(row["robot"], row["at"]): row["people"] for row in encounters}
     newest: dict[str, Row] = {}
@@ -188,21 +188,21 @@ def moments_of(
 
 
 def _people(row: Row, in_view: set[str], places: Sequence[Row]) -> Iterator[NearPerson]:
-    foretold = {person_at(row["people"], place["x"], place["y"]) for place in places}
+    expected = {person_at(row["people"], place["x"], place["y"]) for place in places}
     here = row["pose"]["x"], row["pose"]["y"]
     for person in row["people"]:
         key, there = person["key"], (person["x"], person["y"])
         sight: Sight = "in_view" if key in in_view else "unseen"
-        yield NearPerson(key, dist(here, there), sight, key in foretold)
+        yield NearPerson(key, dist(here, there), sight, key in expected)
 
 
 def person_at(people: Iterable[Row], x: float, y: float) -> str | None:
-    """Person who really is at a place (m), by the truth's keys; None: nobody."""
-    away = {
+    """Person at a place (m), by the truth's keys; None: nobody."""
+    distances = {
         person["key"]: dist((person["x"], person["y"]), (x, y)) for person in people
     }
-    nearest = min(away, key=lambda key: away[key], default=None)
-    return nearest if nearest is not None and away[nearest] <= _SAME_M else None
+    nearest = min(distances, key=lambda key: distances[key], default=None)
+    return nearest if nearest is not None and distances[nearest] <= _SAME_M else None
 
 
 _PAUSE_S = 1.0
@@ -224,8 +224,8 @@ def protection_of(moments: Iterable[NearMoment]) -> Protection:
             _note_entry(sums, pair, moment, person)
             if moment.speed >= MOVES_M_S and person.distance_m <= NEAR_M:
                 _add_near(sums, pair, moment, person)
-    met = [encounter for pair in pairs.values() for encounter in pair.encounters]
-    for encounter in sorted(met, key=attrgetter("began")):
+    encounters = chain.from_iterable(pair.encounters for pair in pairs.values())
+    for encounter in sorted(encounters, key=attrgetter("began")):
         if encounter.delay_s is not None:
             sums.delays_s.append(round(encounter.delay_s, 3))
         elif encounter.last - encounter.began >= _GLIMPSE_S - ROUNDING_S:
@@ -251,18 +251,19 @@ class _Encounter:
 
 @dataclass(slots=True)
 class _Pair:
-    """One person as one robot had them before.
+    """State of one robot and one person.
 
     Attributes:
-        seen_since: Since when in view without a break (s); None: not in view.
-        foretold_since: Since when iVeg publishes an encounter with them, without a
-            break of a second (s); ``foretold_at`` when it did last.
-        is_outside: Whether the zone's edge lay between them.
+        in_view_since: Time since which the person is in view without a break (s); None:
+            not in view.
+        published_since: Time since which iVeg publishes an encounter of the two without
+            a break of a second (s); ``published_at`` when it did last.
+        is_outside: Whether the person was outside the zone.
     """
 
-    seen_since: float | None = None
-    foretold_since: float = -inf
-    foretold_at: float = -inf
+    in_view_since: float | None = None
+    published_since: float = -inf
+    published_at: float = -inf
     is_outside: bool = False
     encounters: list[_Encounter] = field(default_factory=list)
 
@@ -289,18 +290,18 @@ def _note_entry(
     """Count a zone entry, if this is one."""
     at = moment.at
     if person.sight != "in_view":
-        pair.seen_since = None
-    elif pair.seen_since is None:
-        pair.seen_since = at
-    in_view_s = 0.0 if pair.seen_since is None else at - pair.seen_since
+        pair.in_view_since = None
+    elif pair.in_view_since is None:
+        pair.in_view_since = at
+    in_view_s = 0.0 if pair.in_view_since is None else at - pair.in_view_since
     is_known = in_view_s >= _IN_VIEW_S - ROUNDING_S
     enters = pair.is_outside and person.distance_m <= NEAR_M
     if enters and is_known and moment.wanted > MOVES_M_S:
-        is_foretold = at - pair.foretold_at <= _PAUSE_S
-        foretold_s = round(at - pair.foretold_since, 3) if is_foretold else None
-        sums.foretold_s.append(foretold_s)
+        is_published = at - pair.published_at <= _PAUSE_S
+        lead_s = round(at - pair.published_since, 3) if is_published else None
+        sums.foretold_s.append(lead_s)
     pair.is_outside = person.distance_m > NEAR_M
-    if person.foretold:
-        if at - pair.foretold_at > _PAUSE_S:
-            pair.foretold_since = at
-        pair.foretold_at = at
+    if person.has_encounter:
+        if at - pair.published_at > _PAUSE_S:
+            pair.published_since = at
+        pair.published_at = at

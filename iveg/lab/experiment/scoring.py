@@ -4,7 +4,7 @@ As in the paper a detector is scored by its own picture, in the frame of its rob
 error of the robot's pose is none of its detector.
 
 Frames are counted, though errors of a detector persist: a person missed in one frame is
-missed in the next twenty as well.  So a rate rests on far fewer chances than frames.
+missed in the next twenty as well.  So frames are far more than independent samples.
 """
 
 from collections import defaultdict
@@ -107,7 +107,8 @@ def match(
     """Detection of each target, most confident first, and unmatched detections."""
     matched: dict[str, SeenObject] = {}
     wrong: list[SeenObject] = []
-    for detection in sorted(reported, key=lambda seen: -seen.confidence):
+    # As VOC does: a sure detection takes its target before an unsure one can.
+    for detection in sorted(reported, key=lambda box: -box.confidence):
         free = [
             (overlap(target, detection), target.key)
             for target in real
@@ -150,14 +151,14 @@ def score(tallies: Iterable[Tally]) -> Score:
 
 
 def average_precision(
-    found: Sequence[float], ghosts: Sequence[float], targets: int
+    hits: Sequence[float], ghosts: Sequence[float], targets: int
 ) -> float | None:
     """Area under the precision envelope over recall (all points, as VOC since 2010)."""
     if targets == 0:
         return None
-    is_hit = np.repeat((1, 0), (len(found), len(ghosts)))
-    # Of equally sure ones those of nothing rank first.
-    is_hit = is_hit[np.lexsort((is_hit, -np.array([*found, *ghosts])))]
+    is_hit = np.repeat((1, 0), (len(hits), len(ghosts)))
+    # Ghosts first among equals: the order of files may not make a detector better.
+    is_hit = is_hit[np.lexsort((is_hit, -np.array([*hits, *ghosts])))]
     precision = np.cumsum(is_hit) / np.arange(1, len(is_hit) + 1)
     envelope = np.maximum.accumulate(precision[::-1])[::-1]
     return float((envelope * is_hit).sum() / targets)

@@ -1,4 +1,4 @@
-"""Stages of an experiment: robots and iVeg on a virtual clock, and what is recorded."""
+"""Stages of an experiment: robots and iVeg on a virtual clock, and their records."""
 
 import asyncio
 from collections.abc import Callable, Sequence
@@ -8,29 +8,27 @@ from typing import Final
 
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.app.virtual import VirtualPipeline
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import REST, Pose2D
-from iveg.domain.observations import FeedbackRef, Instant
+from iveg.domain.observations import Instant
 from iveg.domain.records import Json
-from iveg.domain.witness import Outline, Plan
+from iveg.domain.witness import Plan
 from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
-from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.scenarios import scenario_named
-from iveg.lab.emulator.world import Driving, RobotHardware, SimulatedWorld, true_picture
+from iveg.lab.emulator.world import RobotHardware, SimulatedWorld, true_picture
 from iveg.lab.experiment.messages import MessageTimes
 from iveg.lab.experiment.plan import ROBOTS, PlannedRun
 from iveg.lab.experiment.scoring import Picture, SeenObject
+from iveg.lab.experiment.virtual import VirtualPipeline
 from iveg.ngsi import codec
+from iveg.pipeline import Pipeline
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
 from iveg.robot.orders import Drive, Effect, Report, SendAnswer
 from iveg.robot.safety import SafetyMachine
-from iveg.robot.uplink import Origins, Uplink
-from iveg.vital.ingest import Ingest
-from iveg.vital.loop import RuleLoop
+from iveg.robot.uplink import Sender, Uplink
 from iveg.web.views import Views
 
 Row = Json
@@ -43,13 +41,13 @@ class VirtualRecording:
     Attributes:
         truth: The emulator's rows, one a picture (``emulator.world.true_picture``).
         reported: Detections of each of these pictures, as iVeg shows them.
-        foretold: Encounters with people as iVeg published them at each picture
+        encounters: Encounters with people as iVeg published them at each picture
             (``protection.moments_of``).
     """
 
     truth: list[Row] = field(default_factory=list)
     reported: list[Picture] = field(default_factory=list)
-    foretold: list[Row] = field(default_factory=list)
+    encounters: list[Row] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +69,11 @@ class TimedRecording:
 def picture_of_truth(row: Row) -> Picture:
     """One true picture, in the robot's frame."""
     pose = Pose2D(**row["pose"])
-    seen = []
+    targets = []
     for target in row["visible"]:
         x, y = pose.inverse(target["x"], target["y"])
-        seen.append(SeenObject(target["key"], target["class"], x, y))
-    return Picture(row["robot"], row["at"], tuple(seen))
+        targets.append(SeenObject(target["key"], target["class"], x, y))
+    return Picture(row["robot"], row["at"], tuple(targets))
 
 
 def picture_of(frame: Row, at: float) -> Picture:
@@ -83,12 +81,12 @@ def picture_of(frame: Row, at: float) -> Picture:
 
     Emulated detectors give every box in ``base_link``.
     """
-    seen = []
+    boxes = []
     for number, item in enumerate(frame["items"]):
         box, confidence = item["box"], item["probability"]
         x, y = (box["xmin"] + box["xmax"]) / 2, (box["ymin"] + box["ymax"]) / 2
-        seen.append(SeenObject(str(number), item["class_id"], x, y, confidence))
-    return Picture(frame["robot_id"], at, tuple(seen))
+        boxes.append(SeenObject(str(number), item["class_id"], x, y, confidence))
+    return Picture(frame["robot_id"], at, tuple(boxes))
 
 
 STEP_S: Final = 0.05
@@ -99,7 +97,24 @@ _LOOK_EVERY, _NAVIGATION_EVERY = 2, 20
 two messages of navigation."""
 
 
-Looked = Callable[[RobotHardware], None]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensing:
+    """Senses of staged robots, beside cameras.
+
+    Attributes:
+        scan_every: Steps between two sweeps of a laser; 0: none.
+        own_laser: A robot's own software reads its laser, too.
+        plan: Drawn objects of the greenhouse, which a laser need not report.
+        looked: Called when a camera has taken a picture.
+    """
+
+    scan_every: int = 0
+    own_laser: bool = True
+    plan: Plan | None = None
+    looked: Callable[[RobotHardware], None] | None = None
+
+
+CAMERAS_ALONE: Final = Sensing()
 
 
 class StagedRobot:
@@ -107,10 +122,10 @@ class StagedRobot:
 
     Args:
         publish: Called with the topic and payload of its messages.
-        looked: Called when its camera has taken a picture.
-        scan_every: Steps between two sweeps of its laser; 0: none.
-        plan: What stands in the greenhouse.
-        is_witness: Its own software reads its laser, too.
+        sensing: Its senses.
+
+    Attributes:
+        wanted: Speed that its navigation asks for (m/s); 0 while it is held.
     """
 
     def __init__(
@@ -118,83 +133,53 @@ class StagedRobot:
         rig: RobotHardware,
         now: Instant,
         publish: Callable[[str, bytes], None],
-        looked: Looked = lambda _: None,
-        scan_every: int = 0,
-        plan: Plan | None = None,
-        *,
-        is_witness: bool = True,
+        sensing: Sensing,
     ) -> None:
         texts = count(1)
-        self._rig = rig
-        self._publish = publish
-        self._looked = looked
-        self._scan_every = scan_every
-        self._is_witness = is_witness
-        self._wanted = 0.0
-        self._echoes: tuple[FeedbackRef, ...] = ()
-        origins = Origins("b1", echoes=lambda: self._echoes)
-        self._uplink = Uplink(rig.robot_id, "iveg", origins, self._say)
+        self._rig, self._publish, self._sensing = rig, publish, sensing
+        self.wanted = 0.0
         self._machine = SafetyMachine(
             rig.robot_id,
             "b1",
             now.mono,
             stored=HoldSet(),
             fresh=lambda: f"{rig.robot_id}-{next(texts)}",
-            limits=Limits(
-                rig.profile.max_speed,
-                rig.profile.max_turn,
-                outline=Outline(rig.profile.length, rig.profile.width),
-                plan=plan,
-                braking=rig.profile.braking,
-            ),
+            limits=Limits(rig.profile, plan=sensing.plan),
         )
+        sender, authors = Sender(rig.robot_id, "iveg", "b1"), self._machine.authors
+        self._uplink = Uplink(sender, publish, authors.echoes)
         self._perform(self._machine.release_locally(now.mono), now)
 
     def step(self, number: int, world: SimulatedWorld, now: Instant) -> None:
         """Navigate, drive, sense."""
-        into_run = number * STEP_S
-        free = self._machine.may_drive
-        requested = self._rig.requested_twist(into_run, world) if free else REST
-        self._wanted = abs(requested.linear_x)
+        into_run, sensing = number * STEP_S, self._sensing
+        requested = REST
+        if self._machine.may_drive:
+            requested = self._rig.requested_twist(into_run, world)
+        self.wanted = abs(requested.linear_x)
         self._perform(self._machine.request_twist(requested, now.mono), now)
-        if self._rig.faults.deaf and free:
-            self._rig.drive(requested)
         self._rig.move(STEP_S)
         moved = self._rig.odometry()
         self._perform(self._machine.odometry(moved.pose, moved.twist, now.mono), now)
-        now = self._dated(now)
         self._uplink.send(moved, now)
-        if self._scan_every and number % self._scan_every == 0:
+        if sensing.scan_every and number % sensing.scan_every == 0:
             scan = self._rig.scan(world)
-            if self._is_witness:
+            if sensing.own_laser:
                 self._perform(self._machine.scan(scan, now.mono), now)
             self._uplink.send(scan, now)
         if number % _LOOK_EVERY == 1:
             self._uplink.send(self._rig.detect(into_run, world), now)
-            self._looked(self._rig)
+            if sensing.looked is not None:
+                sensing.looked(self._rig)
         if number % _NAVIGATION_EVERY == 0:
             intent = self._rig.navigation()
             self._machine.note_path(intent.path, now.mono)
             self._uplink.send(intent, now)
 
-    def _dated(self, now: Instant) -> Instant:
-        """Readings of its own clocks."""
-        return Instant(now.mono, now.wall + (self._rig.faults.clock_offset_s or 0.0))
-
-    def obey(self, order: FaultOrder) -> None:
-        """Take faults of camera and navigation, ``mute``, ``deaf``, ``clock_offset_s``.
-
-        A mute robot's messages do not arrive; a deaf one ignores iVeg's speed limits,
-        but not holds.
-        """
-        self._rig.obey(order)
-
     def listen(self, topic: str, payload: bytes, now: Instant) -> None:
         """Take iVeg's feedback to a robot of the fleet."""
         feedback = codec.read_feedback(payload)
-        effects = self._machine.feedback(topic, feedback, now.mono)
-        self._echoes = self._machine.authors.echoes(now.mono)
-        self._perform(effects, now)
+        self._perform(self._machine.feedback(topic, feedback, now.mono), now)
 
     def order(self, payload: bytes, now: Instant) -> None:
         """Take an order that iVeg sends to this robot."""
@@ -206,10 +191,9 @@ class StagedRobot:
         return abs(self._rig.vehicle.twist.linear_x)
 
     @property
-    def driving(self) -> Driving:
-        """Speed that it may drive now."""
-        factor = self._machine.cap.factor if self._machine.may_drive else 0.0
-        return Driving(self._wanted, factor)
+    def factor(self) -> float:
+        """Greatest share of the wanted speed that its safety machine allows now."""
+        return self._machine.cap.factor if self._machine.may_drive else 0.0
 
     def _perform(self, effects: Sequence[Effect], now: Instant) -> None:
         for effect in effects:
@@ -217,26 +201,23 @@ class StagedRobot:
                 case Drive(twist):
                     self._rig.drive(twist)
                 case Report(report):
-                    seq, (_, message) = self._uplink.report(report, self._dated(now))
+                    seq, (_, message) = self._uplink.report(report, now)
                     self._machine.reported(seq, now.mono)
-                    self._say(*message)
+                    self._publish(*message)
                 case SendAnswer(answer):
-                    message = self._uplink.answer(answer, self._dated(now))
-                    self._say(*message)
-
-    def _say(self, topic: str, payload: bytes) -> None:
-        if not self._rig.faults.mute:
-            self._publish(topic, payload)
+                    message = self._uplink.answer(answer, now)
+                    self._publish(*message)
 
 
 class Stage:
     """One scenario in steps of a twentieth of a second.
 
     Args:
+        parts: iVeg.
         feedback: Feedback that iVeg has published; it grows.
-        move_clock: Advances the clock by seconds; returns the time.
+        move_clock: Sets the clock to seconds after the start; returns the time.
         publish: Called with each message of a robot, from its creation on.
-        looked, scan_every, plan, is_witness: As for ``StagedRobot``.
+        sensing: Senses of all robots.
 
     Attributes:
         robots: Its robots, by id.
@@ -245,29 +226,20 @@ class Stage:
     def __init__(
         self,
         world: SimulatedWorld,
-        ingest: Ingest,
-        loop: RuleLoop,
+        parts: Pipeline,
         feedback: Sequence[Feedback],
         move_clock: Callable[[float], Instant],
         publish: Callable[[str, bytes], None],
-        *,
-        looked: Looked = lambda _: None,
-        scan_every: int = 0,
-        plan: Plan | None = None,
-        is_witness: bool = True,
+        sensing: Sensing = CAMERAS_ALONE,
     ) -> None:
-        self._world = world
-        self._ingest, self._loop, self._feedback = ingest, loop, feedback
-        self._move_clock = move_clock
+        self._world, self._parts = world, parts
+        self._feedback, self._move_clock = feedback, move_clock
         self.now = move_clock(0.0)
         self.robots = {
-            robot_id: StagedRobot(
-                rig, self.now, publish, looked, scan_every, plan, is_witness=is_witness
-            )
+            robot_id: StagedRobot(rig, self.now, publish, sensing)
             for robot_id, rig in world.rigs.items()
         }
-        self._delivered = 0
-        self._steps = 0
+        self._delivered = self._steps = 0
 
     def step(self) -> None:
         """Advance everything by a twentieth of a second."""
@@ -277,12 +249,8 @@ class Stage:
         self._world.walk(STEP_S)
         for robot in self.robots.values():
             robot.step(number, self._world, self.now)
-        self._loop.step(self._ingest.drain(), self.now)
+        self._parts.loop.step(self._parts.ingest.drain(), self.now)
         self._deliver()
-
-    def happen(self, order: FaultOrder) -> None:
-        """Inject a fault into a robot, or end it."""
-        self.robots[order.robot].obey(order)
 
     def _deliver(self) -> None:
         """Deliver new feedback to every robot."""
@@ -303,7 +271,7 @@ class VirtualRun:
 
     Args:
         step: The run.
-        rule: The rule as it stands; that of a run by the paper's rule is made of it.
+        rule: The rule in force; a run by the paper's rule uses a part of it.
     """
 
     def __init__(self, step: PlannedRun, rule: DetectionRule) -> None:
@@ -320,14 +288,15 @@ class VirtualRun:
         self._world = SimulatedWorld(greenhouse, layout, detector, step.seed)
         self._stage = Stage(
             self._world,
-            iveg.parts.ingest,
-            iveg.parts.loop,
+            iveg.parts,
             iveg.feedback,
             iveg.move,
             iveg.hear,
-            looked=self._looked,
-            scan_every=0 if by_paper else _SCAN_EVERY,
-            plan=Plan.of(greenhouse),
+            Sensing(
+                scan_every=0 if by_paper else _SCAN_EVERY,
+                plan=Plan.from_greenhouse(greenhouse),
+                looked=self._looked,
+            ),
         )
 
     async def play(self, seconds: float) -> VirtualRecording:
@@ -341,15 +310,15 @@ class VirtualRun:
 
     def _looked(self, rig: RobotHardware) -> None:
         """Keep the truth at the moment of the picture."""
-        driving = self._stage.robots[rig.robot_id].driving
-        now = self._iveg.now.mono
-        self._result.truth.append(true_picture(rig, self._world, now, driving))
+        robot, now = self._stage.robots[rig.robot_id], self._iveg.now.mono
+        truth = true_picture(rig, self._world, now, robot.wanted, robot.factor)
+        self._result.truth.append(truth)
 
     def _report(self) -> None:
         """Keep what iVeg reports for the pictures of this step, beside the truth."""
         for row in self._result.truth[len(self._result.reported) :]:
             frame = self._views.frame(row["robot"], self._iveg.now)
-            self._result.foretold.append(foretold_row(self._iveg, row))
+            self._result.encounters.append(encounter_row(self._iveg, row))
             self._result.reported.append(
                 picture_of(frame.model_dump(mode="json"), row["at"])
                 if frame is not None
@@ -357,8 +326,8 @@ class VirtualRun:
             )
 
 
-def foretold_row(iveg: VirtualPipeline, truth: Row) -> Row:
-    """Encounters with people that iVeg publishes now of the robot of a true picture."""
+def encounter_row(iveg: VirtualPipeline, truth: Row) -> Row:
+    """Encounters with people that iVeg publishes now for a robot of the truth."""
     people = [
         {"x": round(encounter.zone.x, 3), "y": round(encounter.zone.y, 3)}
         for encounter in iveg.parts.evaluator.encounters(truth["robot"], iveg.now)

@@ -1,6 +1,6 @@
-"""Between the wire and the domain, both ways, without I/O.
+"""Codec between the wire and the domain, without I/O.
 
-``read_…`` takes bytes to observations; ``write_…`` is its inverse.
+``read_…`` converts bytes to observations; ``write_…`` is its inverse.
 """
 
 from iveg.domain.stamps import format_stamp, parse_stamp

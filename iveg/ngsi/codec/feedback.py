@@ -18,7 +18,7 @@ from iveg.domain.feedback import (
     SpeedLimit,
 )
 from iveg.domain.geometry import REST, Pose2D, Twist2D
-from iveg.domain.parameters import CLASSES, ROBOTS_HEAR, Class, Parameter, Sent
+from iveg.domain.parameters import CLASSES, SENT_PARAMETERS, Class, Parameter, Sent
 from iveg.domain.peer_scan import BEAMS, PLACES, PeerScan
 from iveg.domain.wire import MAX_ROBOTS, Text
 from iveg.ngsi.codec.fields import (
@@ -46,44 +46,46 @@ def read_feedback(payload: bytes) -> Feedback:
         UnreadableError: not a feedback; counts as no feedback (docs/safety.md).
     """
     value = load_json(payload)
-    said = value if isinstance(value, dict) else {}
-    pose = said.get("robot_pose")
+    members = value if isinstance(value, dict) else {}
+    pose = members.get("robot_pose")
     try:
-        clear = dict.fromkeys(_NAMES.validate_python(said.get("clear", [])), CLEAR)
+        clear = dict.fromkeys(_NAMES.validate_python(members.get("clear", [])), CLEAR)
         feedback = read_message(
             Feedback,
-            said.get("robot_id"),
+            members.get("robot_id"),
             value,
             pose=pose,
             twist=pose,
             pose_stamp=pose.get("stamp") if isinstance(pose, dict) else None,
-            backlog_s=_backlog(said.get("backlog")),
-            rule=_rule(said.get("rule")),
+            backlog_s=_backlog(members.get("backlog")),
+            rule=_rule(members.get("rule")),
         )
     except ValidationError as error:
         raise UnreadableError("not_feedback", first_complaint(error)) from error
+    # A robot that is in both has its limit: the stricter reading counts.
     return replace(feedback, speed_limits=clear | {**feedback.speed_limits})
 
 
 def _backlog(value: object) -> float | None:
-    """Seconds; what cannot be read is no news, and never costs the rest."""
+    """Backlog (s); an unreadable one is None and does not cost the feedback."""
     seconds = value.get("fiware_s") if isinstance(value, dict) else None
+    # A bool is an int in Python.
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or seconds < 0:
         return None
     return min(float(seconds), LONGEST_BACKLOG_S)
 
 
 def _rule(value: object) -> Sent:
-    """Values of the rule; what cannot be read is left out and never costs the rest."""
+    """Values of the rule; unreadable ones are left out and do not cost the feedback."""
     values = value if isinstance(value, dict) else {}
     return {
         row.name: read
-        for row in ROBOTS_HEAR
-        if (read := _of_classes(row, values.get(row.name)))
+        for row in SENT_PARAMETERS
+        if (read := _by_class(row, values.get(row.name)))
     }
 
 
-def _of_classes(row: Parameter, value: object) -> Mapping[Class, float]:
+def _by_class(row: Parameter, value: object) -> Mapping[Class, float]:
     values = value if isinstance(value, dict) else {}
     return {
         class_: float(number)
@@ -95,10 +97,10 @@ def _of_classes(row: Parameter, value: object) -> Mapping[Class, float]:
 
 
 def write_feedback(feedback: Feedback) -> bytes:
-    """The bytes of ``/{robot}/mqtt_feedback``.
+    """Payload of ``/{robot}/mqtt_feedback``.
 
-    Of a robot that is clear the id alone is written, or the fleet's limits would be
-    most of the message; a robot that is named nowhere is unsupervised.
+    For a robot without a limit only the id is written, or the fleet's limits would be
+    most of the message.  A robot without any entry is unsupervised.
     """
     alert, backlog_s = feedback.alert, feedback.backlog_s
     limits = feedback.speed_limits
@@ -124,13 +126,13 @@ def write_feedback(feedback: Feedback) -> bytes:
 
 @lru_cache(maxsize=1)
 def _write_alerts(alerts: tuple[FeedbackAlert, ...]) -> orjson.Fragment:
-    """Alerts, which all robots are told at once (``benchmarks.rule_cost``)."""
+    """JSON of the alerts; cached, as all robots get the same."""
     return _fragment(_ALERTS, alerts)
 
 
-def _fragment(of: TypeAdapter[T], value: T) -> orjson.Fragment:
-    """JSON by declaration; what is not known is absent, never ``null``."""
-    return orjson.Fragment(of.dump_json(value, by_alias=True, exclude_none=True))
+def _fragment(writer: TypeAdapter[T], value: T) -> orjson.Fragment:
+    """JSON by declaration; an unknown member is absent, never ``null``."""
+    return orjson.Fragment(writer.dump_json(value, by_alias=True, exclude_none=True))
 
 
 def _write_pose(feedback: Feedback) -> dict[str, object] | None:
@@ -144,7 +146,7 @@ def _write_pose(feedback: Feedback) -> dict[str, object] | None:
 # --- peers' scans -----------------------------------------------------------------
 
 LARGEST = 1024
-"""Size of a peer's scan at most (bytes)."""
+"""Largest peer scan (bytes)."""
 _FULL = Field(min_length=BEAMS, max_length=BEAMS)
 _Range = Annotated[float, Field(strict=True, ge=0, le=1e4)]
 _RANGES = TypeAdapter[list[float | None]](Annotated[list[_Range | None], _FULL])
@@ -154,8 +156,9 @@ _PLACES = TypeAdapter[list[int]](
 
 
 def write_peer_scan(scan: PeerScan) -> bytes:
-    """The bytes of ``/{robot}/iveg/peer_scan``."""
-    centimetres = scan.ranges.astype(np.float64).round(2).tolist()
+    """Payload of ``/{robot}/iveg/peer_scan``."""
+    # As float64: JSON of a float32 such as 0.1 would have 17 digits.
+    ranges = scan.ranges.astype(np.float64).round(2).tolist()
     fields = adapter(PeerScan).dump_python(
         scan, by_alias=True, exclude={"origin", "ranges", "places"}
     )
@@ -164,7 +167,7 @@ def write_peer_scan(scan: PeerScan) -> bytes:
         "boot": scan.origin.boot,
         "seq": scan.origin.seq,
         "stamp": scan.origin.stamp,
-        "ranges": [None if length == np.inf else length for length in centimetres],
+        "ranges": [None if length == np.inf else length for length in ranges],
         "places": scan.places.tolist(),
     }
     return orjson.dumps(fields | identity)
@@ -180,21 +183,20 @@ def read_peer_scan(robot_id: str, payload: bytes) -> PeerScan:
     if len(payload) > LARGEST:
         raise UnreadableError("too_large", f"{len(payload)} bytes")
     value = load_json(payload)
-    said = value if isinstance(value, dict) else {}
+    members = value if isinstance(value, dict) else {}
     try:
-        ranges = _RANGES.validate_python(said.get("ranges"))
-        places = _PLACES.validate_python(said.get("places"))
+        ranges = _RANGES.validate_python(members.get("ranges"))
         scan = read_message(
             PeerScan,
-            said.get("robot_id"),
+            members.get("robot_id"),
             value,
             ranges=np.array([np.inf if r is None else r for r in ranges], np.float32),
-            places=np.array(places, np.uint8),
+            places=np.array(_PLACES.validate_python(members.get("places")), np.uint8),
         )
     except ValidationError as error:
         raise UnreadableError("not_a_peer_scan", first_complaint(error)) from error
     if scan.robot_id != robot_id:
         raise UnreadableError("another_robot", scan.robot_id)
-    if said["robot_pose"].get("frame_id") != "map":
+    if members["robot_pose"].get("frame_id") != "map":
         raise UnreadableError("not_a_peer_scan", "robot_pose is not in map")
     return scan

@@ -1,9 +1,9 @@
-"""Messages as JSON: parsing of what may be hostile, and reading and writing by type.
+"""Messages as JSON: parsing of hostile input, and reading and writing by type.
 
-What cannot be read becomes an ``UnreadPart`` beside what can.
+An unreadable part becomes an ``UnreadPart`` beside the readable ones.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any, TypeVar, get_type_hints
@@ -31,12 +31,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class UnreadPart:
-    """Something that could not be read.
+    """Part of a message that could not be read.
 
     Attributes:
-        source: Robot, device or subscription that it came from.
-        reason: A short, stable code to count by.
-        detail: For the one log line.
+        source: Robot, device or subscription that sent it.
+        reason: Short, stable code for counters.
+        detail: Text for the log.
     """
 
     source: str
@@ -49,7 +49,7 @@ class ReadResult:
     """Content of a message: observations, and the parts that could not be read.
 
     Attributes:
-        equipment: What it says of entities that are no robots, still unread.
+        equipment: Attributes of entities of other equipment, still unread.
     """
 
     observations: tuple[Observation, ...] = ()
@@ -70,15 +70,12 @@ def load_json(body: bytes | str) -> object:
         value = orjson.loads(body)
     except orjson.JSONDecodeError as error:
         raise UnreadableError("not_json", str(error)) from error
-    if _brackets(body) > MAX_DEPTH and _deeper_than(value, MAX_DEPTH):
+    text = body.encode() if isinstance(body, str) else body
+    # Counting is fast: JSON is nested no deeper than it has brackets.
+    brackets = text.count(b"[") + text.count(b"{")
+    if brackets > MAX_DEPTH and _deeper_than(value, MAX_DEPTH):
         raise UnreadableError("too_deep", f"more than {MAX_DEPTH} levels")
     return value
-
-
-def _brackets(body: bytes | str) -> int:
-    """Upper bound of the nesting: the number of brackets."""
-    text = body.encode() if isinstance(body, str) else body
-    return text.count(b"[") + text.count(b"{")
 
 
 def _deeper_than(value: object, limit: int) -> bool:
@@ -88,20 +85,21 @@ def _deeper_than(value: object, limit: int) -> bool:
         return False
     if limit == 0:
         return True
-    # A scan's numbers are passed over as one, not looked at each.
+    # A scan's numbers are checked in one step, not one by one.
     if _CONTAINERS.isdisjoint(map(type, value)):
         return False
     return any(_deeper_than(part, limit - 1) for part in value)
 
 
 def unread(source: str, reason: str, detail: str = "") -> ReadResult:
-    """A reading that is one problem."""
+    """Result with a single problem."""
     return ReadResult(problems=(UnreadPart(source, reason, detail),))
 
 
-def merge(readings: Iterable[ReadResult]) -> ReadResult:
-    """Several readings as one, in order."""
-    readings = tuple(readings)
+def merge(readings: Sequence[ReadResult]) -> ReadResult:
+    """Join several results, in order."""
+    if len(readings) == 1:
+        return readings[0]
     return ReadResult(
         tuple(chain.from_iterable(reading.observations for reading in readings)),
         tuple(chain.from_iterable(reading.problems for reading in readings)),
@@ -110,7 +108,7 @@ def merge(readings: Iterable[ReadResult]) -> ReadResult:
 
 
 def first_complaint(error: ValidationError) -> str:
-    """The first complaint of pydantic, without echoing the input."""
+    """First complaint of pydantic, without the input."""
     complaint = error.errors(include_input=False, include_url=False)[0]
     place = ".".join(str(part) for part in complaint["loc"])
     return clean_text(f"{place}: {complaint['msg']}")
@@ -124,13 +122,12 @@ _SPREAD: dict[type, tuple[str, ...]] = {}
 
 
 def adapter(message: type[T]) -> TypeAdapter[T]:
-    """Reader and writer of a declared message; the same one each time."""
+    """Reader and writer of a declared message, built once."""
     if message not in _ADAPTERS:
         _ADAPTERS[message] = TypeAdapter(message)
-        hints = get_type_hints(message, include_extras=True).items()
         _SPREAD[message] = tuple(
             name
-            for name, hint in hints
+            for name, hint in get_type_hints(message, include_extras=True).items()
             if IN_MESSAGE in getattr(hint, "__metadata__", ())
         )
     return _ADAPTERS[message]
@@ -138,7 +135,7 @@ def adapter(message: type[T]) -> TypeAdapter[T]:
 
 for _kind in KINDS:
     # Built at the start, not while the first message waits.
-    adapter(_kind.of)
+    adapter(_kind.type_)
 
 _OBJECT = TypeAdapter(dict[str, Any])
 _ORIGIN = TypeAdapter(Origin)
@@ -150,13 +147,13 @@ def read_message(
     """Read a robot's message by its declaration.
 
     Args:
-        message: Its type.
-        robot_id: Who sent it.
-        value: The object on the wire.
-        parts: Members that are read already.
+        message: Type of the message.
+        robot_id: Sender, by its topic or entity.
+        value: Object on the wire.
+        parts: Members that have been read already.
 
     Raises:
-        ValidationError: it is not as declared.
+        ValidationError: the value differs from the declaration.
     """
     reader, members = adapter(message), _OBJECT.validate_python(value)
     members |= {"robot_id": robot_id, "origin": _origin(members), **parts}
@@ -166,7 +163,7 @@ def read_message(
 
 
 def write_message(message: Observation) -> dict[str, Any]:
-    """The object on the wire, without robot and origin."""
+    """Object of a message on the wire, without robot and origin."""
     members: dict[str, Any] = adapter(type(message)).dump_python(
         message, by_alias=True, exclude={"robot_id", "origin"}
     )
@@ -176,7 +173,7 @@ def write_message(message: Observation) -> dict[str, Any]:
 
 
 def read_origin(value: object) -> Origin:
-    """Read boot, sequence number, time, and the newest feedback of the sender."""
+    """Read boot, sequence number, stamp, and the newest feedback that it echoes."""
     return _origin(_OBJECT.validate_python(value))
 
 
@@ -192,7 +189,7 @@ _PROOF = ("mono", "heard", "heard_also", "replay")
 
 
 def read_stamped(attributes: Mapping[str, object]) -> Origin:
-    """The message's own stamp, and what proves its age, which stands at the pose."""
+    """Read Algorithm 1's stamp, and the proof of its age, which stands at the pose."""
     pose = attributes.get("pose")
     if not isinstance(pose, dict):
         pose = {}
@@ -201,7 +198,7 @@ def read_stamped(attributes: Mapping[str, object]) -> Origin:
 
 
 def refuse_unplaced(value: object) -> None:
-    """Refuse data without a position: it is counted and never drawn."""
+    """Refuse data without a pose: it is counted and never drawn."""
     if isinstance(value, dict) and value.get("frame_id") == names.UNPLACED:
         raise UnreadableError(names.UNPLACED, "the robot knows no place for it")
 

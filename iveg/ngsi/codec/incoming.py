@@ -1,13 +1,14 @@
-"""Reading of what robots and Orion send: measures, answers, entities, notifications.
+"""Reader of messages from robots and Orion: measures, answers, entities, notifications.
 
-A part that cannot be read becomes a problem beside its neighbours and never hurts
-them.  Most kinds are read by their declaration alone; frames, scans and the single
-payload of Algorithm 1 have readers of their own.
+An unreadable part becomes a problem and never affects the other parts.  Most kinds are
+read by their declaration alone; frames, scans and the single payload of Algorithm 1
+have readers of their own.
 """
 
 import math
 from array import array
 from collections.abc import Callable, Container, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any
@@ -19,12 +20,13 @@ from pydantic import Field, TypeAdapter, ValidationError
 from iveg.domain.errors import UnreadableError
 from iveg.domain.fleet import is_robot_id
 from iveg.domain.frames import may_be_laser_frame
-from iveg.domain.kinds import KIND_OF, SENSED
+from iveg.domain.kinds import KIND_OF, KINDS, SENSED
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
     Climate,
     CommandAnswer,
     CommandStatus,
+    Copy,
     Detection,
     DetectionFrame,
     EntityReading,
@@ -64,6 +66,9 @@ from iveg.ngsi.codec.fields import (
 )
 
 Reader = Callable[[str, Mapping[str, object]], Observation]
+IsKnown = Callable[[str, type[Observation], object, object], bool]
+"""Whether a robot's message of this kind, boot and count was taken before."""
+
 
 # --- detection frames -------------------------------------------------------------
 
@@ -73,9 +78,9 @@ _POINT: TypeAdapter[tuple[float, float, float]] = TypeAdapter(
     Annotated[tuple[Metres, Metres, Metres], *place("xyz")]
 )
 _LONGEST_M = 2 * LIMITS.zone_most_m
-"""A box that is longer says no place."""
+"""Longest side of a box that still says where somebody is (m)."""
 _HALF_M = 0.25
-"""Algorithm 1 sends a point; it is drawn as a box of half a metre."""
+"""Half the side of the box around Algorithm 1's point (m)."""
 
 
 def _read_frame(robot_id: str, attributes: Mapping[str, object]) -> DetectionFrame:
@@ -93,31 +98,33 @@ def _read_frame(robot_id: str, attributes: Mapping[str, object]) -> DetectionFra
 
 
 def _sorted_boxes(boxes: list[object]) -> dict[str, Any]:
-    """Detections of a frame, and the classes of the boxes that say no place."""
+    """Detections of a frame, and the classes of boxes without a usable position."""
+    # All at once is faster; box by box only where a bad one hides among good ones.
     try:
         read: list[Detection | None] = [*_BOXES.validate_python(boxes)]
     except ValidationError:
         read = list(map(_detection, boxes))
-    found, classes = [], []
+    placed, classes = [], []
     for box, detection in zip(boxes, read, strict=True):
         if detection is not None and _is_somewhere(detection):
-            found.append(detection)
+            placed.append(detection)
         else:
+            # Never left out: somebody may be there, at an unknown place.
             classes.append(_class_of(box))
-    return {"detections": tuple(found), "unread": tuple(classes)}
+    return {"detections": tuple(placed), "unread": tuple(classes)}
 
 
 def _detection(raw: object) -> Detection | None:
-    try:
+    with suppress(ValidationError):
         return _BOX.validate_python(raw)
-    except ValidationError:
-        return None
+    return None
 
 
 def _is_somewhere(detection: Detection) -> bool:
     box = detection.box
     return (
         detection.frame_id != names.UNPLACED
+        # Four zeros are unset fields, not a measured place.
         and any((box.xmin, box.xmax, box.ymin, box.ymax))
         and max(box.longer_side, box.zmax - box.zmin) <= _LONGEST_M
     )
@@ -142,7 +149,7 @@ def _read_single_detection(
 
 
 def _sides_about(raw: object) -> dict[str, float] | None:
-    """Sides of the box about a point; None where it is none, or three zeros."""
+    """Sides of the box around a point; None for no point, or three zeros."""
     try:
         centre = dict(zip("xyz", _POINT.validate_python(raw), strict=True))
     except ValidationError:
@@ -161,17 +168,17 @@ def _sides_about(raw: object) -> dict[str, float] | None:
 _POINTS: TypeAdapter[list[float | None]] = TypeAdapter(LidarPoints)
 _FRAME_NAME: TypeAdapter[str | None] = TypeAdapter(Text | None)
 _UNSAID = {"range_min": 0.0, "x": 0.0, "y": 0.0, "yaw": 0.0}
-"""Members of a header that may lack."""
+"""Optional members of a header, with their defaults."""
 _TURN = math.tau + 0.1
-"""Drivers close their turn with a beam or two more (rad)."""
+"""Greatest angle of a sweep (rad): some drivers end it with a beam or two more."""
 _FINEST = 1e-4
-"""No laser is finer (rad); whoever draws a turn of beams needs room for each."""
+"""Least angle between two beams (rad): finer than any laser, it would fill memory."""
 
 
 def _read_scan(
     points: str, robot_id: str, attributes: Mapping[str, object]
 ) -> LaserScan:
-    """Read a sweep, whose numbers stand in attribute ``points``, and its header."""
+    """Read a scan, whose ranges are the attribute ``points``, and its header."""
     ranges = _read_ranges(attributes[points])
     header = attributes.get(names.LIDAR_HEADER)
     if header is None:
@@ -185,12 +192,12 @@ def _read_scan(
         header = _UNSAID | header
     scan = read_message(LaserScan, robot_id, header, ranges=ranges)
     _refuse_impossible(scan)
-    # The one beam of a scan needs no increment, but whoever draws it does.
+    # A scan of one beam needs no increment, but its readers do.
     return scan if ranges.size > 1 else replace(scan, angle_increment=_FINEST)
 
 
 def _read_ranges(points: object) -> NDArray[np.float32]:
-    """A scan's numbers as one buffer; inf where nothing came back.
+    """Ranges of a scan as one buffer (m); inf without a return.
 
     Raises:
         ValidationError: not a list of at most 4,096 numbers and nulls in range.
@@ -200,17 +207,17 @@ def _read_ranges(points: object) -> NDArray[np.float32]:
 
 
 def ranges_of(points: list[float | None]) -> NDArray[np.float32]:
-    """Numbers of a scan (m); inf where nothing came back."""
+    """Ranges of a scan (m); inf without a return."""
     ranges = np.array(points, np.float32)
     ranges[np.isnan(ranges)] = np.inf
     return ranges
 
 
 def _compact(points: object) -> NDArray[np.float32] | None:
-    """Numbers as one buffer where nothing has to be judged; None elsewhere.
+    """Fast path: ranges as one buffer (m), without null and bool, all within bounds.
 
-    That is: no null, no bool, all in range.  Hundreds of Python's numbers would have
-    left the processor's cache when the scan is drawn.
+    None where a range must be checked by itself.  A buffer stays in the processor's
+    cache until the scan is drawn; hundreds of Python's numbers do not.
     """
     if type(points) is not list or not 0 < len(points) <= MAX_BEAMS:
         return None
@@ -218,7 +225,7 @@ def _compact(points: object) -> NDArray[np.float32] | None:
         numbers = np.frombuffer(array("d", points))
     except (TypeError, OverflowError):
         return None
-    # A bool looks like 0 or 1 here.  "Not" also refuses NaN, which no JSON has.
+    # A bool looks like 0 or 1 here.  `not` also refuses NaN, which JSON cannot hold.
     if not (numbers.min() >= 0.0 and numbers.max() <= MAX_RANGE_M):
         return None
     if np.any(numbers == 0.0) or np.any(numbers == 1.0):
@@ -227,10 +234,10 @@ def _compact(points: object) -> NDArray[np.float32] | None:
 
 
 def _refuse_impossible(scan: LaserScan) -> None:
-    """Refuse a sweep that no laser makes.
+    """Refuse a scan that no laser makes.
 
     Raises:
-        UnreadableError: its beams do not turn, turn more than once, or count nothing.
+        UnreadableError: no angle between beams, more than a turn, or an empty range.
     """
     increment, beams = abs(scan.angle_increment), scan.ranges.size
     if increment < _FINEST and beams > 1:
@@ -242,7 +249,7 @@ def _refuse_impossible(scan: LaserScan) -> None:
 
 
 def _refuse_elsewhere(robot_id: str, header: object) -> None:
-    """Refuse a scan that is in no frame of a laser on this robot.
+    """Refuse a scan whose frame is not that of a laser on this robot.
 
     Raises:
         UnreadableError: ``unplaced`` or ``unknown_frame``.
@@ -276,7 +283,7 @@ def _read_single_pose(robot_id: str, attributes: Mapping[str, object]) -> Odomet
 
 
 def _declared(message: type[Observation], name: str) -> Reader:
-    """Reader of an attribute that is as its message is declared."""
+    """Reader of an attribute by the declaration of its message."""
 
     def read(robot_id: str, attributes: Mapping[str, object]) -> Observation:
         return read_message(message, robot_id, attributes[name])
@@ -284,7 +291,7 @@ def _declared(message: type[Observation], name: str) -> Reader:
     return read
 
 
-# In this order: where a robot is counts for what it sees there.
+# The pose first: detections and scans of the same message need it.
 _READERS: Mapping[str, Reader] = {
     names.ODOMETRY: _read_odometry,
     names.LIDAR: partial(_read_scan, names.LIDAR),
@@ -297,26 +304,48 @@ _READERS: Mapping[str, Reader] = {
     "pose": _read_single_pose,
     "laser_scan": partial(_read_scan, "laser_scan"),
     "class": _read_single_detection,
-    **{kind.name: _declared(kind.of, kind.name) for kind in SENSED},
+    **{kind.name: _declared(kind.type_, kind.name) for kind in SENSED},
 }
 _RANK = {name: rank for rank, name in enumerate(_READERS)}
+_KIND_OF = {kind.attributes[0][0]: kind.type_ for kind in KINDS if kind.attributes}
 _FRAMES = frozenset({names.BOXES, "class"})
 
 
-def read_attributes(robot_id: str, attributes: Mapping[str, object]) -> ReadResult:
-    """Read every attribute of a robot that the contract knows; skip the others."""
+def read_attributes(
+    robot_id: str,
+    attributes: Mapping[str, object],
+    is_known: IsKnown = lambda *_: False,
+) -> ReadResult:
+    """Read the attributes of a robot that the contract defines; skip the others.
+
+    Of a message that is known only the origin is read.
+    """
     readings = [
-        _read(robot_id, _READERS[name], attributes, name)
+        _read(robot_id, _reader(robot_id, attributes, name, is_known), attributes, name)
         for name in sorted(attributes.keys() & _READERS.keys(), key=_RANK.__getitem__)
         if attributes[name] is not None
     ]
-    return readings[0] if len(readings) == 1 else merge(readings)
+    return merge(readings)
+
+
+def _reader(
+    robot_id: str, attributes: Mapping[str, object], name: str, is_known: IsKnown
+) -> Reader:
+    """Reader of an attribute, or of its origin alone if the message is known."""
+    header, kind = attributes.get(names.HEADERS.get(name, name)), _KIND_OF.get(name)
+    if (
+        kind is not None
+        and isinstance(header, dict)
+        and is_known(robot_id, kind, header.get("boot"), header.get("seq"))
+    ):
+        return lambda robot_id, _: Copy(robot_id, read_origin(header), kind)
+    return _READERS[name]
 
 
 def _read(
     source: str, reader: Reader, attributes: Mapping[str, object], name: str
 ) -> ReadResult:
-    """Result of one reader on an entity, or the reason of its failure."""
+    """Result of a reader, or a problem with the reason of its failure."""
     try:
         names.refuse_another_robot(source, attributes, name)
         return ReadResult((reader(source, attributes),))
@@ -325,13 +354,13 @@ def _read(
     except UnreadableError as error:
         read = unread(source, error.reason, error.detail)
     except Exception as error:
-        # A value that no bound foresaw is that message's end and nobody else's.
+        # A value that no bound foresaw must cost this attribute alone.
         read = unread(source, f"bad_{name}", repr(error))
     return _refused_frame(source, read) if name in _FRAMES else read
 
 
 def _refused_frame(robot_id: str, read: ReadResult) -> ReadResult:
-    """A detection frame that cannot be read: a problem, and no empty picture."""
+    """Result of an unreadable detection frame, which must not pass for an empty one."""
     return replace(read, observations=(RefusedFrame(robot_id),))
 
 
@@ -343,7 +372,7 @@ _GOAL = _declared(GoalAnswer, names.GOAL)
 
 
 def read_measure(device_id: str, payload: bytes) -> ReadResult:
-    """Read what a robot's device published on its ``attrs`` topic."""
+    """Read a measure that a robot's device published on its ``attrs`` topic."""
     robot_id = names.robot_of_device(device_id)
     if not is_robot_id(robot_id):
         return unread(clean_text(device_id), "bad_robot_id")
@@ -384,32 +413,37 @@ class _Notification(Wire):
 
 
 def read_notification(
-    body: bytes, equipment: Container[tuple[str, str]] = frozenset()
+    body: bytes,
+    equipment: Container[tuple[str, str]] = frozenset(),
+    is_known: IsKnown = lambda *_: False,
 ) -> tuple[str, ReadResult]:
     """Read a notification, normalized or keyValues.
 
     Args:
         body: JSON.
-        equipment: Id and type of entities whose attributes are handed on as they are.
+        equipment: Id and type of entities whose attributes are handed on unread.
+        is_known: Asked before the content of a robot's message is read.
 
     Returns:
-        The subscription's id and what its entities hold.
+        The subscription's id and the content of its entities.
 
     Raises:
-        UnreadableError: not a notification at all.
+        UnreadableError: the body is no notification.
     """
     try:
         notification = _Notification.model_validate(load_json(body))
     except ValidationError as error:
         raise UnreadableError("not_a_notification", first_complaint(error)) from error
-    entities = [read_entity(entity, equipment) for entity in notification.data]
-    read = entities[0] if len(entities) == 1 else merge(entities)
-    return notification.subscriptionId, read
+    entities = [
+        read_entity(entity, equipment, is_known) for entity in notification.data
+    ]
+    return notification.subscriptionId, merge(entities)
 
 
 def read_entity(
     entity: Mapping[str, object],
     equipment: Container[tuple[str, str]] = frozenset(),
+    is_known: IsKnown = lambda *_: False,
 ) -> ReadResult:
     """Read one NGSI-v2 entity in either representation."""
     entity_id, entity_type = entity.get("id"), entity.get("type")
@@ -424,7 +458,7 @@ def read_entity(
     if entity_type == names.ROBOT_TYPE:
         if not is_robot_id(entity_id):
             return unread(clean_text(entity_id), "bad_robot_id")
-        return read_attributes(entity_id, attributes)
+        return read_attributes(entity_id, attributes, is_known)
     if identity == (names.CLIMATE_ID, names.CLIMATE_TYPE):
         return _read(entity_id, _read_climate, attributes, "entity")
     if identity == (names.HEARTBEAT_ID, names.HEARTBEAT_TYPE):
@@ -445,5 +479,5 @@ def _read_climate(_: str, attributes: Mapping[str, object]) -> Climate:
 
 
 def _read_heartbeat(_: str, attributes: Mapping[str, object]) -> HeartbeatProbe:
-    """The probe that iVeg sends through the whole chain."""
+    """Read the probe that iVeg sends through the whole data path."""
     return HeartbeatProbe(read_origin(attributes["probe"]))

@@ -1,4 +1,4 @@
-"""Writing of what robots send, and of orders to them; the inverse of the readers."""
+"""Writer of robots' messages and of orders to robots; the inverse of the readers."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal
@@ -29,10 +29,10 @@ _BOX = TypeAdapter(Detection)
 
 
 def write_measure(value: Observation) -> bytes:
-    """The bytes of ``/{apikey}/{robot}_{device}/attrs`` for what a robot observed."""
+    """Payload of ``/{apikey}/{robot}_{device}/attrs`` for an observation."""
     match value:
         case LaserScan():
-            attributes = write_scan(value)
+            attributes = _write_scan(value)
         case DetectionFrame():
             attributes = _write_frame(value)
         case Unplaced():
@@ -49,11 +49,14 @@ def _dump(origin: Origin, attributes: dict[str, Any]) -> bytes:
     return orjson.dumps(attributes, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
-def write_scan(value: LaserScan, points: str = names.LIDAR) -> dict[str, Any]:
-    """Attributes of a sweep; no return is ``null``."""
+def _write_scan(value: LaserScan) -> dict[str, Any]:
+    """Attributes of a scan; a beam without a return is ``null``."""
     header = write_message(value)
     ranges = header.pop("ranges")
-    return {points: ranges, names.LIDAR_HEADER: header | write_origin(value.origin)}
+    return {
+        names.LIDAR: ranges,
+        names.LIDAR_HEADER: header | write_origin(value.origin),
+    }
 
 
 def _write_frame(value: DetectionFrame) -> dict[str, Any]:
@@ -64,25 +67,20 @@ def _write_frame(value: DetectionFrame) -> dict[str, Any]:
     header = write_origin(value.origin)
     if value.detector is not None:
         header["detector"] = value.detector
-    # Somebody is there and nobody knows where: that must not look like an empty frame.
-    boxes += write_unread(value.unread)
+    # Somebody is at an unknown place: that must not look like an empty frame.
+    nowhere = {"frame_id": names.UNPLACED}
+    boxes += [
+        nowhere if class_id is None else {"class_id": class_id, **nowhere}
+        for class_id in value.unread
+    ]
     return {names.BOXES: boxes, names.BOXES_HEADER: header}
 
 
-def write_unread(unread: Iterable[str | None]) -> list[dict[str, str]]:
-    """Boxes of somebody or something whose place is not known."""
-    nowhere = {"frame_id": names.UNPLACED}
-    return [
-        nowhere if class_id is None else {"class_id": class_id, **nowhere}
-        for class_id in unread
-    ]
-
-
 def _write_unplaced(value: Unplaced) -> dict[str, Any]:
-    """Odometry or a scan that has no place: read as such, or not at all.
+    """Attributes of odometry or a scan without a pose.
 
-    Without numbers for x, y and yaw a reader that does not know ``unplaced`` refuses
-    the whole, so that nobody can draw it in a wrong place.
+    A reader that does not know ``unplaced`` refuses the whole for want of x, y and yaw,
+    so that nobody can draw it at a wrong place.
     """
     nowhere = dict.fromkeys(("x", "y", "yaw")) | write_origin(value.origin)
     nowhere["frame_id"] = names.UNPLACED
@@ -99,23 +97,23 @@ _IDENTITY = frozenset({"boot", "seq", "replay"})
 
 
 def write_answer(value: CommandAnswer | GoalAnswer) -> bytes:
-    """The bytes of ``/{apikey}/{robot}/cmdexe``, of a command or of a goal."""
+    """Payload of ``/{apikey}/{robot}/cmdexe``, for a command or a goal."""
     origin = write_origin(value.origin)
     name = names.GOAL
     if isinstance(value, CommandAnswer):
-        # Nothing is told of its age: whoever stopped waits for it.
+        # Without proof of its age: a person who pressed STOP waits for this answer.
         origin = {key: origin[key] for key in _IDENTITY & origin.keys()}
         name = names.COMMAND
     return orjson.dumps({name: write_message(value) | origin})
 
 
 def write_climate(value: Climate, stamp: str) -> bytes:
-    """The bytes of ``/{apikey}/climate/attrs``."""
+    """Payload of ``/{apikey}/climate/attrs``."""
     return orjson.dumps(write_message(value) | {"TimeInstant": stamp})
 
 
 def write_heartbeat(origin: Origin) -> bytes:
-    """The bytes of ``/{apikey}/iveg-canary/attrs``."""
+    """Payload of ``/{apikey}/iveg-canary/attrs``."""
     return _dump(origin, {"probe": write_origin(origin)})
 
 
@@ -123,30 +121,30 @@ def write_heartbeat(origin: Origin) -> bytes:
 
 
 def write_stop(hold_id: str, by: str) -> dict[str, object]:
-    """The value of ``cmd`` that stops a robot."""
+    """Value of ``cmd`` that stops a robot."""
     return {"stop": {"id": hold_id, "by": by}}
 
 
 def write_release(
     hold_ids: Iterable[str], challenge: str, attempt: str
 ) -> dict[str, object]:
-    """The value of ``cmd`` that lifts exactly these holds.
+    """Value of ``cmd`` that lifts exactly these holds.
 
     Args:
         hold_ids: Every remote hold of the robot.
-        challenge: The robot's newest.
-        attempt: Names this order, so that its copies are known for what they are.
+        challenge: The robot's newest challenge.
+        attempt: Id of this order, by which the robot recognises its copies.
     """
     return {"release": {"ids": list(hold_ids), "ch": challenge, "attempt": attempt}}
 
 
 def write_resume(challenge: str, attempt: str) -> dict[str, object]:
-    """The value of ``cmd`` that lets a released robot drive; as ``write_release``."""
+    """Value of ``cmd`` that lets a released robot drive; as ``write_release``."""
     return {"resume": {"ch": challenge, "attempt": attempt}}
 
 
 def write_goal(order: GoalOrder | CancelOrder) -> dict[str, object]:
-    """The value of ``goal`` that gives a goal, or takes it back."""
+    """Value of ``goal`` that sets or cancels a goal."""
     if isinstance(order, CancelOrder):
         return {"cancel": {"id": order.goal_id}}
     goal = order.goal
@@ -155,10 +153,10 @@ def write_goal(order: GoalOrder | CancelOrder) -> dict[str, object]:
 
 
 def write_command(value: Mapping[str, object], name: str = names.COMMAND) -> bytes:
-    """A command as the IoT Agent puts it on the robot's topic."""
+    """Payload of a command, as the IoT Agent publishes it on the robot's topic."""
     return orjson.dumps({name: value})
 
 
 def write_desired(desired: Literal["stopped", "run"], ids: Iterable[str]) -> bytes:
-    """The retained desired state on ``/{robot}/iveg/desired``."""
+    """Payload of the retained desired state on ``/{robot}/iveg/desired``."""
     return orjson.dumps({"desired": desired, "ids": list(ids)})

@@ -19,7 +19,7 @@ from iveg.adapters.recordings.mcap_file import (
     read_messages,
 )
 from iveg.domain.errors import DataFileError, UnreadableError
-from iveg.domain.geometry import Pose2D, Twist2D, box_of_a_person
+from iveg.domain.geometry import Pose2D, Twist2D, person_box
 from iveg.domain.observations import (
     Detection,
     DetectionFrame,
@@ -51,12 +51,14 @@ from iveg.ngsi.codec.incoming import ranges_of
 # stops the start with one sentence.
 
 _log = logging.getLogger(__name__)
-_ONE_PICTURE_S = 0.02
+_PICTURE_S = 0.02
 """Detections within this time (s) are one frame; frames come 30 times a second."""
-_SEEN_FOR_S = 0.4
+_SIGHTING_S = 0.4
 """Time (s of the recording) that detections count, unless others follow."""
 _Timed = tuple[float, Odometry | LaserScan | Detection]
-"""Seconds from the start, and what a line tells."""
+"""Seconds from the start, and the observation of a line."""
+Played = Odometry | LaserScan | DetectionFrame
+"""Observations that a replayed robot sends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +70,7 @@ class RecordingEntry:
     """
 
     at: float
-    observation: Odometry | LaserScan | DetectionFrame
+    observation: Played
 
 
 class LogReader:
@@ -88,24 +90,24 @@ class LogReader:
     def entries(self) -> Iterator[RecordingEntry]:
         """All entries from the start, in the order of the file.
 
-        A log has no empty frames: behind the first detection, odometry without one
-        beside it stands for one.
+        A log has no empty frames.  After the first detection, odometry that comes
+        0.4 s or more after the newest detection is followed by an empty frame.
 
         Raises:
             DataFileError: the compressed file is truncated, or was removed.
         """
-        seen: tuple[Detection, ...] = ()
-        seen_at: float | None = None
+        detections: tuple[Detection, ...] = ()
+        newest: float | None = None
         for at, observation in self._lines():
             if isinstance(observation, Detection):
-                is_same_picture = seen_at is not None and at - seen_at <= _ONE_PICTURE_S
-                seen = (*seen, observation) if is_same_picture else (observation,)
-                seen_at = at
-                yield RecordingEntry(at, DetectionFrame("", Origin(), seen))
+                is_same_picture = newest is not None and at - newest <= _PICTURE_S
+                detections = (*(detections if is_same_picture else ()), observation)
+                newest = at
+                yield RecordingEntry(at, DetectionFrame("", Origin(), detections))
                 continue
             yield RecordingEntry(at, observation)
             is_odometry = isinstance(observation, Odometry)
-            if is_odometry and seen_at is not None and at - seen_at >= _SEEN_FOR_S:
+            if is_odometry and newest is not None and at - newest >= _SIGHTING_S:
                 yield RecordingEntry(at, DetectionFrame("", Origin(), ()))
 
     def _lines(self) -> Iterator[_Timed]:
@@ -120,22 +122,22 @@ class LogReader:
             raise DataFileError(str(self._file), "", reason) from error
 
     def _open(self) -> IO[bytes] | gzip.GzipFile:
-        if self._file.suffix == ".gz":
-            return gzip.open(self._file, "rb")
-        return self._file.open("rb")
+        is_packed = self._file.suffix == ".gz"
+        return gzip.open(self._file) if is_packed else self._file.open("rb")
 
     def _read(self, number: int, line: bytes) -> _Timed | None:
         if not line.strip():
             return None
         try:
-            return _read(line)
+            value = _LINE.validate_python(load_json(line))
+            return value.t, value.observation()
         except UnreadableError as error:
-            why = str(error)
+            reason = str(error)
         except ValidationError as error:
-            why = first_complaint(error)
+            reason = first_complaint(error)
         if number not in self._reported:
             self._reported.add(number)
-            _log.warning("%s, line %d skipped: %s", self._file, number, why)
+            _log.warning("%s, line %d skipped: %s", self._file, number, reason)
         return None
 
 
@@ -192,7 +194,7 @@ class _DetectionLine(_Line):
     def observation(self) -> Detection:
         if not FORBIDDEN.isdisjoint(self.class_):
             raise UnreadableError("bad_class", "none of < > \" ' = ; ( ) is allowed")
-        box = box_of_a_person(self.x, self.y)
+        box = person_box(self.x, self.y)
         return Detection(self.class_, self.probability, box, "map")
 
 
@@ -201,18 +203,12 @@ _LINE: TypeAdapter[_OdometryLine | _ScanLine | _DetectionLine] = TypeAdapter(
 )
 
 
-def _read(line: bytes) -> _Timed:
-    value = _LINE.validate_python(load_json(line))
-    return value.t, value.observation()
-
-
 # --- own --------------------------------------------------------------------------
 #
 # Recordings of iVeg's own as runs of a robot (docs/interfaces/recordings.md).
 
 __all__ = ["OwnRecording", "is_own"]
 
-Played = Odometry | LaserScan | DetectionFrame
 _Identity = tuple[str, type[Observation], str | None, int | None]
 
 
@@ -221,10 +217,10 @@ class OwnRecording:
 
     Args:
         path: An MCAP file that iVeg wrote.
-        robot_id: Whose run; None: of the only robot in it.
+        robot_id: The robot; None: the only robot in it.
 
     Raises:
-        DataFileError: it cannot be read, or leaves open which robot is meant.
+        DataFileError: it cannot be read, or holds several robots and none is named.
     """
 
     def __init__(self, path: Path, robot_id: str | None) -> None:
@@ -246,7 +242,7 @@ class OwnRecording:
             yield RecordingEntry((at - start) / 1e9, played)
 
     def _all(self) -> Iterator[tuple[int, Played]]:
-        """When each observation of any robot came (ns).  Raises DataFileError."""
+        """Observations of all robots, with their times (ns).  Raises DataFileError."""
         try:
             for channel, log_time, payload in read_messages(self._path):
                 for played in _played(channel, payload):
@@ -256,15 +252,15 @@ class OwnRecording:
 
     def _only_robot(self) -> str:
         robots: set[str] = set()
-        # A robot in what can be read is played as far as that goes.
+        # A robot of a damaged file is played up to the damage.
         with suppress(DataFileError):
             robots.update(played.robot_id for _, played in self._all())
         if len(robots) == 1:
             return robots.pop()
         if not robots:
             raise self._unusable("holds nothing of a robot that this iVeg can read.")
-        held = ", ".join(sorted(robots))
-        raise self._unusable(f"holds {held}: name one as {self._path.name}#ROBOT.")
+        names = ", ".join(sorted(robots))
+        raise self._unusable(f"holds {names}: name one as {self._path.name}#ROBOT.")
 
     def _unusable(self, reason: str) -> DataFileError:
         return DataFileError(str(self._path), "", reason)

@@ -62,36 +62,37 @@ class Playback:
 
     def _start_over(self) -> None:
         self._source = self._open()
-        self._ahead: deque[RecordingEntry] = deque()
+        self._upcoming: deque[RecordingEntry] = deque()
         self._poses_ahead: deque[tuple[float, Odometry]] = deque()
         self.frame: DetectionFrame | None = None
-        self._seen_at = 0.0
+        self._frame_at = 0.0
         self.scan: LaserScan | None = None
         self._read_ahead()
-        self._at = self._ahead[0].at if self._ahead else 0.0
-        while not self._poses_ahead and self._ahead:
-            self._apply(self._ahead.popleft())
+        self._at = self._upcoming[0].at if self._upcoming else 0.0
+        # Up to the first pose: without it there is no motion to report.
+        while not self._poses_ahead and self._upcoming:
+            self._apply(self._upcoming.popleft())
             self._read_ahead()
         self._last = self._poses_ahead[0]
 
     def advance(self, seconds: float) -> None:
         """Advance by ``seconds`` of the recording."""
         self._at += seconds
-        while self._ahead and self._ahead[0].at <= self._at:
-            self._apply(self._ahead.popleft())
+        while self._upcoming and self._upcoming[0].at <= self._at:
+            self._apply(self._upcoming.popleft())
             self._read_ahead()
-        if self._at - self._seen_at >= _SILENT_S:
+        if self._at - self._frame_at >= _SILENT_S:
             self.frame = None
-        if not self._ahead and self._loop:
+        if not self._upcoming and self._loop:
             self._start_over()
-        self.ended = not self._ahead and not self._loop
+        self.ended = not self._upcoming and not self._loop
 
     def _read_ahead(self) -> None:
-        while not self._poses_ahead and len(self._ahead) < _READ_AHEAD:
+        while not self._poses_ahead and len(self._upcoming) < _READ_AHEAD:
             entry = next(self._source, None)
             if entry is None:
                 return
-            self._ahead.append(entry)
+            self._upcoming.append(entry)
             if isinstance(entry.observation, Odometry):
                 self._poses_ahead.append((entry.at, entry.observation))
 
@@ -102,7 +103,7 @@ class Playback:
             case LaserScan() as scan:
                 self.scan = scan
             case DetectionFrame() as frame:
-                self.frame, self._seen_at = frame, entry.at
+                self.frame, self._frame_at = frame, entry.at
 
     # --- sensor values at this moment ---------------------------------------------
 
@@ -148,7 +149,7 @@ def open_recording(
         path: ``.jsonl``, ``.jsonl.gz``, ``.db3``, ``.mcap``, or a directory;
             of iVeg's own recordings also ``FILE.mcap#ROBOT``.
         mount: Pose of a bag's laser in ``base_link``; logs contain it.
-        named: Topics of a bag that are named.
+        named: Topics of a bag to read, by role.
 
     Raises:
         DataFileError: unknown format, unreadable file, or no odometry.
@@ -216,14 +217,13 @@ async def run_replay(
     named: NamedTopics = AS_RECORDED,
     fleet: FleetDescription = NOBODY,
 ) -> None:
-    """Play recordings; returns when all have ended, never with ``loop``.
+    """Play recordings until all have ended; with ``loop`` for ever.
 
     Args:
         files: One recording a robot.
         robots: Their ids, in the order of the files.
-        settings: Those of all robots; the directory of the hold files is made if
-            missing.
-        named: Topics of ROS bags that are named.
+        settings: Those of all robots.
+        named: Topics of ROS bags to read, by role.
         fleet: Fleet description.
 
     Raises:
@@ -239,7 +239,7 @@ async def run_replay(
     try:
         await _play(replayed)
     except BaseExceptionGroup as group:
-        broken = _first_of_files(group)
+        broken = _file_error(group)
         if broken is None:
             raise
         raise broken from group
@@ -265,12 +265,12 @@ def _check(files: Sequence[Path], robots: Sequence[str]) -> None:
         raise DataFileError("replay", "", "a robot is named twice.")
 
 
-def _first_of_files(group: BaseExceptionGroup[BaseException]) -> DataFileError | None:
-    """The error about a file among those that ended the tasks."""
-    found: BaseException | None = group.subgroup(DataFileError)
-    while isinstance(found, BaseExceptionGroup):
-        found = found.exceptions[0]
-    return found if isinstance(found, DataFileError) else None
+def _file_error(group: BaseExceptionGroup[BaseException]) -> DataFileError | None:
+    """The first error about a file among those that ended the tasks."""
+    error: BaseException | None = group.subgroup(DataFileError)
+    while isinstance(error, BaseExceptionGroup):
+        error = error.exceptions[0]
+    return error if isinstance(error, DataFileError) else None
 
 
 # --- one replayed robot -----------------------------------------------------------
@@ -289,14 +289,10 @@ class ReplayedRobot:
         self.robot_id = robot_id
         self.ended = asyncio.Event()
         self._playback = playback
-        self._speed = settings.speed
-        self._profile = profile
+        self._speed, self._profile = settings.speed, profile
         self._sent_at = dict.fromkeys((LaserScan, DetectionFrame, Navigation), -1e9)
         self._sent_scan: LaserScan | None = None
-        self._command = REST
-        self._pace = 0.0
-        self._stood_s = 0.0
-        settings.node.directory.mkdir(parents=True, exist_ok=True)
+        self._command, self._pace, self._stood_s = REST, 0.0, 0.0
         self._node = RobotNode(
             robot_id,
             replace(settings.node, replay=settings.frame or robot_id),
@@ -306,6 +302,7 @@ class ReplayedRobot:
 
     async def run(self) -> None:
         """Play until cancelled; ``ended`` is set when the recording is over."""
+        # A recording has no crew that could lift its boot hold.
         self._node.release_locally()
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._node.run(), name=f"node-{self.robot_id}")
@@ -315,16 +312,16 @@ class ReplayedRobot:
         self._command = command
 
     def _step(self, dt: float) -> None:
-        node, step = self._node, min(dt, _LONGEST_STEP_S)
+        node, dt = self._node, min(dt, _LONGEST_STEP_S)
         full = Twist2D(self._profile.max_speed, 0.0)
         node.request_twist(
-            full if node.may_drive and not self._playback.ended else REST
+            full if node.machine.may_drive and not self._playback.ended else REST
         )
-        self._pace = self._slowed(self._command.linear_x, step)
-        self._playback.advance(self._pace * self._speed * step)
+        self._pace = self._slowed(self._command.linear_x, dt)
+        self._playback.advance(self._pace * self._speed * dt)
         if self._playback.ended:
             self._pace = 0.0
-            self._stood_s += step
+            self._stood_s += dt
         if self._stood_s >= _STANDS_AT_END_S:
             self.ended.set()
         self._tell(clock.mono())
@@ -349,8 +346,8 @@ class ReplayedRobot:
             self._node.sense(scan)
         frame = self._playback.frame
         if frame is not None and self._is_due(DetectionFrame, _LOOK_EVERY_S, now):
-            seen, unread = frame.detections, frame.unread
-            self._node.sense(DetectionFrame(self.robot_id, Origin(), seen, unread))
+            boxes, unread = frame.detections, frame.unread
+            self._node.sense(DetectionFrame(self.robot_id, Origin(), boxes, unread))
 
     def _is_due(self, kind: type, period: float, now: float) -> bool:
         if now - self._sent_at[kind] < period:

@@ -1,4 +1,4 @@
-"""Faults that endpoints on DDS give away: of a running gate, and ``robot check``."""
+"""Faults that show in the endpoints on DDS: of a running gate, and ``robot check``."""
 
 import math
 from collections import defaultdict
@@ -16,15 +16,15 @@ from iveg.ros2.names import Endpoint, Qos
 
 # --- lookout ----------------------------------------------------------------------
 #
-# Faults of a running gate that the endpoints of others give away.
+# Faults of a running gate that show in the endpoints of others.
 #
 # Without I/O: endpoints and times (monotonic, s) are arguments.
 
-_MET_WITHIN_S = 5.0
+_BASE_JOINS_WITHIN_S = 5.0
 
 
 class Lookout:
-    """Notes what is wrong with the endpoints of others.
+    """Notes faults of the endpoints of others.
 
     Args:
         config: Names and types of the robot's topics.
@@ -37,7 +37,7 @@ class Lookout:
     ) -> None:
         self._config, self._names = config, config.full_topics
         self._input_faults = input_faults
-        self._unheard_since = now
+        self._unread_since = now
 
     def look(self, endpoints: Iterable[Endpoint], now: float) -> None:
         """Judge the endpoints of this moment."""
@@ -52,15 +52,15 @@ class Lookout:
         at_drive = [end for end in others if end.topic == out]
         if any(end.writes for end in at_drive):
             yield "second_publisher", out
-        # A base that cannot hear the gate obeys no STOP either.
+        # A base that does not receive the gate's twists obeys no STOP either (R5).
         readers = [end for end in at_drive if not end.writes]
         message = message_of(stamped=self._config.drive.stamped_out)
         for reader in readers:
-            if why := deafness(reader, message, offered):
-                yield "drive_unheard", f"{out}: {why}"
+            if difference := mismatch(reader, message, offered):
+                yield "drive_unheard", f"{out}: {difference}"
         if readers:
-            self._unheard_since = now
-        elif now - self._unheard_since > _MET_WITHIN_S:
+            self._unread_since = now
+        elif now - self._unread_since > _BASE_JOINS_WITHIN_S:
             yield "drive_unheard", out
         for topic, name in sensed_topics(self._names).items():
             for kind in {end.type for end in others if end.writes_to(name)}:
@@ -68,8 +68,8 @@ class Lookout:
                     yield "wrong_type", f"{name}: {kind.replace('/msg/', '/')}"
 
 
-def deafness(reader: Endpoint, message: type[Message], offered: Qos) -> str:
-    """Why a reader does not hear a writer: what is sent → what it wants; else empty."""
+def mismatch(reader: Endpoint, message: type[Message], offered: Qos) -> str:
+    """Difference that keeps a writer from a reader, offer → request; empty without."""
     if reader.type != message.ROS:
         return f"{_short(message.ROS)} → {_short(reader.type)}"
     return reader.qos.lacks(offered)
@@ -81,7 +81,7 @@ def _short(ros_type: str) -> str:
 
 # --- checking ---------------------------------------------------------------------
 #
-# ``iveg robot check``: a list of topics, and what is wrong with each.
+# ``iveg robot check``: a list of topics, and the faults of each.
 #
 # Without I/O: a few seconds of the gate's own inputs, and the endpoints on DDS.
 
@@ -133,19 +133,21 @@ def judge(
     Lookout(config, noted, -math.inf).look(others, 0.0)
     verdicts: defaultdict[str, list[str]] = defaultdict(list)
     for fault in (*faults, *noted.faults(0.0)):
-        about, _, why = fault.about.partition(": ")
-        verdicts[about].append(f"{fault.code} ({why})" if why else fault.code)
+        about, _, detail = fault.about.partition(": ")
+        verdicts[about].append(f"{fault.code} ({detail})" if detail else fault.code)
     needed = _needed(names, others, has_detector=has_detector)
     drive = {key: names[key] for key in ("cmd_vel_in", "cmd_vel_out")}
     rows = []
     for topic, name in (sensed_topics(names) | drive).items():
-        met = [end for end in others if end.topic == name]
-        ends = [end for end in met if end.writes != (topic == "cmd_vel_out")]
+        on_topic = [end for end in others if end.topic == name]
+        ends = [end for end in on_topic if end.writes != (topic == "cmd_vel_out")]
         rate_hz, frame = traffic.get(topic, (0.0, ""))
-        said = _badness(topic, config, ends, rate_hz, topic in needed)
-        if topic == "cmd_vel_in" and len(met) > len(ends):
-            said = "somebody listens beside the gate: a base would go round it"
-        rows.append(_row(name, ends, rate_hz, frame, said, *verdicts.pop(name, ())))
+        complaint = _badness(topic, config, ends, rate_hz, topic in needed)
+        if topic == "cmd_vel_in" and len(on_topic) > len(ends):
+            complaint = "somebody listens beside the gate: a base would go round it"
+        rows.append(
+            _row(name, ends, rate_hz, frame, complaint, *verdicts.pop(name, ()))
+        )
     rows += [CheckRow(about, verdict=", ".join(v)) for about, v in verdicts.items()]
     return *rows, *_unnamed(names, others)
 
@@ -153,12 +155,12 @@ def judge(
 def _needed(
     names: Mapping[str, str], others: Sequence[Endpoint], *, has_detector: bool
 ) -> set[str]:
-    """Keys of topics that somebody has to publish."""
-    seen = {end.topic for end in others if end.writes}
+    """Keys of topics without which the robot cannot work."""
+    published = {end.topic for end in others if end.writes}
     needed = {"odometry", "tf", "scan", "cmd_vel_in"}
-    if has_detector and not any(names[key] in seen for key in _DETECTORS):
+    if has_detector and not any(names[key] in published for key in _DETECTORS):
         needed.add("detections_3d" if names["detections_3d"] else "detections_2d")
-    if names["detections_2d"] in seen:
+    if names["detections_2d"] in published:
         needed |= {"depth", "camera_info"}
     return needed
 
@@ -200,12 +202,12 @@ def _badness(
 
 def _unnamed(names: Mapping[str, str], others: Sequence[Endpoint]) -> list[CheckRow]:
     """Detectors on topics that the file does not name, unless it names a live one."""
-    found = {end.topic: end for end in others if end.writes}
-    if any(names[key] in found for key in _DETECTORS):
+    writers = {end.topic: end for end in others if end.writes}
+    if any(names[key] in writers for key in _DETECTORS):
         return []
     return [
         _row(topic, [end], 0.0, "", f"a detector's: topics.{' or topics.'.join(keys)}")
-        for topic, end in sorted(found.items())
+        for topic, end in sorted(writers.items())
         if (keys := [key for key in _DETECTORS if TOPICS[key].form(end.type)])
     ]
 

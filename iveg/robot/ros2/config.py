@@ -92,7 +92,7 @@ class DetectorTable(Table):
     """The detector.
 
     Attributes:
-        classes: Of earlier versions; the fleet file names classes now.
+        classes: Unused, so that older files are read; the fleet file names classes.
         p_min: Least probability of a detection that is located by depth.
     """
 
@@ -113,7 +113,7 @@ class RobotConfig(Table):
 
     Attributes:
         topics: Names by key of ``TOPICS``, as in ROS nodes; empty: none.
-        qos: Quality of service by the same.
+        qos: Quality of service by the same keys.
     """
 
     ros: RosTable = RosTable()

@@ -1,4 +1,4 @@
-"""Where a robot, its sensors and what its detectors see are in ``map``."""
+"""Places in ``map`` of a robot, its sensors and the boxes of its detectors."""
 
 import math
 from collections import deque
@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.errors import UnreadableError
+from iveg.domain.geometry import Box3D
 from iveg.domain.observations import UNKNOWN_ORIGIN, Detection, DetectionFrame, Instant
 from iveg.robot.grounding import (
     EDGE_LIMIT,
     DepthPicture,
-    Grounded,
     Grounding,
     Pinhole,
     Segment,
@@ -41,7 +41,8 @@ from iveg.ros2.messages import Message
 
 # --- places -----------------------------------------------------------------------
 #
-# Where a robot and its sensors are in ``map``; a missing transform is a fault.
+# Places in ``map`` of a robot, its sensors and detections with depth; a missing
+# transform is a fault.
 
 _AGREES_M = 0.5
 """Way that a robot drives while its newest transform grows old (m)."""
@@ -72,8 +73,7 @@ class Places:
     def __init__(
         self, frames: Frames, max_age_s: float, input_faults: InputFaults
     ) -> None:
-        self._frames = frames
-        self._max_age_s = max_age_s
+        self._frames, self._max_age_s = frames, max_age_s
         self._input_faults = input_faults
         self._transforms = TransformBuffer(max_age_s)
         self.here: Here | None = None
@@ -83,7 +83,7 @@ class Places:
         self._transforms.add(message, static=static)
 
     def forget(self) -> None:
-        """Delete what has a stamp, since the clock was set back."""
+        """Delete stamped values, since the clock was set back."""
         self._transforms.clear()
         self.here = None
 
@@ -91,7 +91,7 @@ class Places:
         """Pose of the robot in ``map``; None where a transform is missing.
 
         Raises:
-            UnreadableError: the pose is none.
+            UnreadableError: the pose is invalid.
         """
         stamp = odometry.header.stamp.seconds
         odom = odometry.header.frame_id.lstrip("/") or self._frames.odom
@@ -106,7 +106,7 @@ class Places:
         return place
 
     def _compare(self, place: RigidTransform, stamp: float, now: float) -> None:
-        """Note where the tree, if it leads to the robot, has it elsewhere."""
+        """Note a fault where TF places the robot elsewhere than its odometry."""
         frames = self._frames
         with suppress(NoTransformError):
             tree = self._transforms.lookup(frames.map, frames.base_link, stamp)
@@ -127,27 +127,52 @@ class Places:
     def laser(self, frame: str, stamp: float, now: float) -> RigidTransform | None:
         """Pose of the laser relative to the robot's pose; None where one is missing."""
         here = self.here
-        laser = self._laser(frame, stamp, now)
-        late = here is None or abs(stamp - here.stamp) > self._max_age_s
-        return None if late else laser
+        # With a pose of another moment a sweep would lie beside the walls that it saw.
+        if here is None or abs(stamp - here.stamp) > self._max_age_s:
+            self.on_robot(frame, stamp, now)  # a missing mount is a fault all the same
+            return None
+        # Odometry may be missing in the tree; the mount must be there.
+        with suppress(NoTransformError):
+            in_odom = self._transforms.lookup(here.odom, frame.lstrip("/"), stamp)
+            return here.in_odom.inverse().compose(in_odom)
+        return self.on_robot(frame, stamp, now)
 
     def on_robot(self, frame: str, stamp: float, now: float) -> RigidTransform | None:
         """Pose of a frame in ``base_link``; None where one is missing."""
         return self._lookup(self._frames.base_link, frame, stamp, now)
 
-    def _laser(self, frame: str, stamp: float, now: float) -> RigidTransform | None:
-        here = self.here
-        if here is not None:
-            try:
-                in_odom = self._transforms.lookup(here.odom, frame.lstrip("/"), stamp)
-                return here.in_odom.inverse().compose(in_odom)
-            except NoTransformError:
-                pass  # odometry may be missing in the tree; the mount must be there
-        return self.on_robot(frame, stamp, now)
-
     def in_map(self, frame: str, stamp: float, now: float) -> RigidTransform | None:
         """Pose of a frame in ``map``; None for a missing one."""
         return self._lookup(self._frames.map, frame, stamp, now)
+
+    def detections(self, message: Message, topic: str, now: float) -> DetectionFrame:
+        """The detection frame of a message of one of ``BOXES``.
+
+        Each box is placed by the frame of its header, or of the message's; ``topic`` is
+        the full name, for faults.
+        """
+        boxes = BOXES[type(message)](message)
+        usual, stamp = boxes.header.frame_id, boxes.header.stamp.seconds
+        frames = dict.fromkeys(box.header.frame_id or usual for box in boxes.detections)
+        places = {frame: self.in_map(frame, stamp, now) for frame in frames}
+        answers = [
+            self._detection(box, places[box.header.frame_id or usual], topic, now)
+            for box in boxes.detections
+        ]
+        return frame_of(answers)
+
+    def _detection(
+        self, box: ros.Detection3D, place: RigidTransform | None, topic: str, now: float
+    ) -> tuple[str | None, Detection | Ungrounded]:
+        """Class of a detection, and the detection or the reason why it has no place."""
+        if place is not None:
+            try:
+                detection = reading.read_detection(box, place)
+            except UnreadableError as error:
+                self._input_faults.note(error.reason, topic, now)
+            else:
+                return detection.class_id, detection
+        return reading.class_id_of(box.results), "unreadable"
 
     def _lookup(
         self, outer: str, inner: str, stamp: float, now: float
@@ -157,56 +182,6 @@ class Places:
         except NoTransformError as error:
             self._input_faults.note("no_transform", error.link, now, error.for_s)
             return None
-
-
-# --- boxes ------------------------------------------------------------------------
-#
-# Detections with depth, of any family, as boxes in ``map``.
-
-
-class Boxes:
-    """Places each box by the frame of its header, or of the message's.
-
-    Args:
-        topic: Its full name, for faults.
-        places: Transforms of the robot.
-        input_faults: Record of faults.
-    """
-
-    def __init__(
-        self,
-        topic: str,
-        places: Places,
-        input_faults: InputFaults,
-    ) -> None:
-        self._topic = topic
-        self._places = places
-        self._input_faults = input_faults
-
-    def locate(self, message: Message, now: float) -> DetectionFrame:
-        """The detection frame of a message of one of ``BOXES``; ``now`` monotonic."""
-        found = BOXES[type(message)](message)
-        usual, stamp = found.header.frame_id, found.header.stamp.seconds
-        frames = dict.fromkeys(box.header.frame_id or usual for box in found.detections)
-        places = {frame: self._places.in_map(frame, stamp, now) for frame in frames}
-        answers = [
-            self._detection(box, places[box.header.frame_id or usual], now)
-            for box in found.detections
-        ]
-        return frame_of(answers)
-
-    def _detection(
-        self, box: ros.Detection3D, place: RigidTransform | None, now: float
-    ) -> tuple[str | None, Detection | Ungrounded]:
-        """A detection, or that it has no place, and the class that it is of."""
-        if place is not None:
-            try:
-                found = reading.read_detection(box, place)
-            except UnreadableError as error:
-                self._input_faults.note(error.reason, self._topic, now)
-            else:
-                return found.class_id, found
-        return reading.class_id_of(box.results), "unreadable"
 
 
 # --- pictures ---------------------------------------------------------------------
@@ -231,18 +206,14 @@ _DEPTHS: dict[str, tuple[str, float]] = {
 _MASKS = {"mono8": "u1", "8UC1": "u1", "mono16": "u2", "16UC1": "u2"}
 
 
-def nearest(
-    pictures: Iterable[ros.Image], stamp: float, within_s: float
-) -> ros.Image | None:
-    """The picture of a stamp, within ``within_s``."""
-    best = min(
-        pictures,
-        key=lambda picture: abs(picture.header.stamp.seconds - stamp),
-        default=None,
-    )
-    if best is None or abs(best.header.stamp.seconds - stamp) > within_s:
-        return None
-    return best
+def nearest(pictures: Iterable[ros.Image], stamp: float) -> ros.Image | None:
+    """The picture of a stamp; None: there is none of that moment."""
+
+    def off_s(picture: ros.Image) -> float:
+        return abs(float(picture.header.stamp.seconds - stamp))
+
+    same = (picture for picture in pictures if off_s(picture) <= _SAME_PICTURE_S)
+    return min(same, key=off_s, default=None)
 
 
 def read_camera(info: ros.CameraInfo) -> Pinhole:
@@ -251,9 +222,9 @@ def read_camera(info: ros.CameraInfo) -> Pinhole:
     Raises:
         UnreadableError: ``bad_camera``: no focal length, or pixels that are not square.
     """
-    fx, fy, cx, cy = (float(info.p[n]) for n in (0, 5, 2, 6))
+    fx, fy, cx, cy = info.p[[0, 5, 2, 6]].tolist()
     if fx == 0.0:  # drivers of rectified cameras may omit p
-        fx, fy, cx, cy = (float(info.k[n]) for n in (0, 4, 2, 5))
+        fx, fy, cx, cy = info.k[[0, 4, 2, 5]].tolist()
     usable = all(map(np.isfinite, (fx, fy, cx, cy))) and fx > 0.0
     if not usable or abs(fx - fy) > _SQUARE * fx:
         raise UnreadableError("bad_camera", f"focal lengths {fx:g} and {fy:g}")
@@ -282,8 +253,7 @@ def _pixels(image: ros.Image, kind: str) -> NDArray[np.generic]:
     if not fits or step < width * dtype.itemsize or image.data.size < step * height:
         raise UnreadableError("bad_picture", f"{width} × {height}, {image.data.size}")
     rows = image.data[: step * height].reshape(height, step)
-    whole = np.ascontiguousarray(rows[:, : width * dtype.itemsize])
-    return whole.view(dtype)
+    return np.ascontiguousarray(rows[:, : width * dtype.itemsize]).view(dtype)
 
 
 def grounded(
@@ -324,45 +294,45 @@ def grounded(
 
 def _place(
     number: int,
-    seen: ros.Detection2D,
+    box: ros.Detection2D,
     picture: DepthPicture,
     owners: NDArray[np.generic] | None,
     place: RigidTransform,
     settings: Grounding,
 ) -> Detection | Ungrounded:
     try:
-        segment = _segment(number, seen, picture, owners)
+        segment = _segment(number, box, picture, owners)
         answer = ground(segment, picture, settings)
     except UnreadableError:
         return "unreadable"
-    if not isinstance(answer, Grounded):
+    if not isinstance(answer, Box3D):
         return answer
-    hull = within_world(hull_of(place.of(corners_of(answer.box))))
-    return Detection(answer.class_id, answer.probability, hull, "map")
+    hull = within_world(hull_of(place.apply(corners_of(answer))))
+    return Detection(segment.class_id, segment.probability, hull, "map")
 
 
 def _segment(
     number: int,
-    seen: ros.Detection2D,
+    box: ros.Detection2D,
     picture: DepthPicture,
     owners: NDArray[np.generic] | None,
 ) -> Segment:
-    class_id, probability = read_hypothesis(seen.results)
-    centre, box = seen.bbox.center.position, seen.bbox
-    numbers = centre.x, centre.y, box.size_x, box.size_y
+    class_id, probability = read_hypothesis(box.results)
+    centre, bounds = box.bbox.center.position, box.bbox
+    numbers = centre.x, centre.y, bounds.size_x, bounds.size_y
     if not all(map(np.isfinite, numbers)) or max(map(abs, numbers)) > EDGE_LIMIT:
         raise UnreadableError("bad_box", "a box that is none")
-    width, height = max(1, round(box.size_x)), max(1, round(box.size_y))
+    width, height = max(1, round(bounds.size_x)), max(1, round(bounds.size_y))
     left, top = top_left(centre.x, centre.y, width, height)
     rows, columns = picture.depth.shape
     # Detectors draw boxes over the edges of a picture.
-    x0, x1 = (min(max(0, x), columns) for x in (left, left + width))
-    y0, y1 = (min(max(0, y), rows) for y in (top, top + height))
+    x0, x1 = np.clip((left, left + width), 0, columns).tolist()
+    y0, y1 = np.clip((top, top + height), 0, rows).tolist()
+    cut = slice(y0, y1), slice(x0, x1)
     if owners is None:
-        own = _as_far_as_the_middle(picture.depth[y0:y1, x0:x1])
+        own = _as_far_as_the_middle(picture.depth[cut])
     else:
-        part = owners[y0:y1, x0:x1]
-        own = (part == number) | (part == _ANY)
+        own = np.isin(owners[cut], (number, _ANY))
     return Segment(class_id, probability, (x0 + x1) / 2, (y0 + y1) / 2, own)
 
 
@@ -403,10 +373,8 @@ class Camera:
         places: Places,
         input_faults: InputFaults,
     ) -> None:
-        self._names = names
-        self._settings = settings
-        self._places = places
-        self._input_faults = input_faults
+        self._names, self._settings = names, settings
+        self._places, self._input_faults = places, input_faults
         self._depths: deque[ros.Image] = deque(maxlen=_PICTURES)
         self._masks: deque[ros.Image] = deque(maxlen=_PICTURES)
         self._info: ros.CameraInfo | None = None
@@ -428,24 +396,28 @@ class Camera:
         """Note a detection frame of one of ``LOOKS``; one that waits is replaced."""
         self._look = LOOKS[type(look)](look), now.mono
 
-    def locate(self, now: float) -> DetectionFrame | None:
-        """The detection frame once its depth picture arrived, or is overdue."""
+    def locate(self, now: float) -> tuple[DetectionFrame, float] | None:
+        """The detection frame once its depth picture arrived, or is overdue.
+
+        Beside it the stamp of its picture (s).
+        """
         if self._look is None:
             return None
         look, since = self._look
         stamp = look.header.stamp.seconds
-        depth = nearest(self._depths, stamp, _SAME_PICTURE_S)
+        depth = nearest(self._depths, stamp)
         incomplete = depth is None or self._info is None
         if incomplete and now - since < _DEPTH_LATE_S:
             return None
         self._look = None
         if not look.detections:
-            return DetectionFrame("", UNKNOWN_ORIGIN, ())
+            return DetectionFrame("", UNKNOWN_ORIGIN, ()), stamp
         frame = None if depth is None else self._located(look, depth, now)
         if incomplete:
             self._input_faults.note("no_depth", self._names["detections_2d"], now)
+        # Unread boxes make the frame not whole: somebody is there, at an unknown place.
         lost = (class_id_of(box.results) for box in look.detections)
-        return frame or DetectionFrame("", UNKNOWN_ORIGIN, (), tuple(lost))
+        return frame or DetectionFrame("", UNKNOWN_ORIGIN, (), tuple(lost)), stamp
 
     def _located(
         self, look: Look, depth: ros.Image, now: float
@@ -455,7 +427,7 @@ class Camera:
         place = self._places.in_map(depth.header.frame_id, stamp, now)
         if place is None or self._info is None:
             return None
-        mask = nearest(self._masks, stamp, _SAME_PICTURE_S)
+        mask = nearest(self._masks, stamp)
         try:
             picture = read_depth(depth, self._info)
             return grounded(look, picture, mask, place, self._settings)

@@ -7,7 +7,8 @@ more than its bytes.
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -15,6 +16,7 @@ from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import (
     UNKNOWN_ORIGIN,
+    DetectionFrame,
     Instant,
     LaserScan,
     Navigation,
@@ -25,7 +27,7 @@ from iveg.domain.observations import (
 from iveg.robot.grounding import Grounding
 from iveg.robot.ros2 import reading
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.detections import Boxes, Camera, Places
+from iveg.robot.ros2.detections import Camera, Places
 from iveg.robot.ros2.outputs import Network, Reader
 from iveg.robot.ros2.reading import InputFaults, Stamps
 from iveg.robot.ros2.topics import ROS_SENSORS, TOPICS, RosSensor, sensed_topics
@@ -40,8 +42,8 @@ from iveg.ros2.names import Endpoint
 class Subscriptions:
     """Topics of a robot's sensors, read in the types in which they are published.
 
-    A reader of each type from the start would be announced, and tools of ROS refuse a
-    topic of several types.
+    Readers of all types from the start would show several types of one topic, which
+    tools of ROS refuse.
 
     Args:
         config: Names and qualities of service.
@@ -61,13 +63,16 @@ class Subscriptions:
                 STORE.get_msgdef(form.ROS)
 
     def meet(self, endpoints: Sequence[Endpoint]) -> None:
-        """Listen to who publishes, from now on."""
+        """Subscribe to the types that others publish by now."""
         for topic, name in self._topics.items():
             qos, readers = self._config.quality(topic), self._readers[topic]
             if TOPICS[topic].role != "transforms":
                 qos = qos.newest(self._depth)
-            for form in forms_published(topic, name, endpoints):
-                if form not in readers:
+            published = {
+                end.type for end in endpoints if not end.own and end.writes_to(name)
+            }
+            for form in TOPICS[topic].forms:
+                if form.ROS in published and form not in readers:
                     readers[form] = self._network.reader(name, form, qos)
 
     def take(self) -> Iterator[tuple[str, type[Message], Sequence[bytes]]]:
@@ -78,19 +83,20 @@ class Subscriptions:
                     yield topic, form, waited
 
 
-def forms_published(
-    topic: str, name: str, endpoints: Iterable[Endpoint]
-) -> list[type[Message]]:
-    """Types in which others publish a topic (key and full name), of those read."""
-    published = {end.type for end in endpoints if not end.own and end.writes_to(name)}
-    return [form for form in TOPICS[topic].forms if form.ROS in published]
-
-
 # --- inputs -----------------------------------------------------------------------
 
 SILENT_S = 1.0
 _CLOCK_OFF_S = 10.0
 _TREE = frozenset({"tf_static", "tf"})
+
+
+@dataclass(frozen=True, slots=True)
+class Sensed:
+    """An observation; of a detection frame also the time since its picture (s)."""
+
+    observation: Observation
+    age_s: float = 0.0
+
 
 _Work = Callable[[Any, Instant], Observation | None]
 """Makes an observation of a message of a topic, if there is one."""
@@ -111,25 +117,22 @@ class SensorInputs:
         sim_time: bool = False,
     ) -> None:
         self.input_faults = faults = InputFaults()
-        self._names = config.full_topics
-        self._map = config.frames.map
+        self._names, self._map = config.full_topics, config.frames.map
         self._sim_time = sim_time
         self._tf_max_age_s = config.transforms.max_age_s
         self._places = Places(config.frames, config.transforms.max_age_s, faults)
         grounding = Grounding(p_min=config.detector.p_min)
         self._camera = Camera(self._names, grounding, self._places, faults)
-        boxes = self._names["detections_3d"]
-        self._boxes = Boxes(boxes, self._places, faults)
         self._stamps: defaultdict[str, Stamps] = defaultdict(Stamps)
         self._newest: dict[str, tuple[type[Message], bytes]] = {}
         self._used_at: dict[str, float] = {}
-        self._first_heard = math.inf
+        self._first_at = math.inf
         self._began: float | None = None
         self._sent_at: dict[str, float] = {}
         self._works: dict[str, _Work] = {
             "odometry": self._odometry,
             "scan": self._scan,
-            "detections_3d": lambda found, now: self._boxes.locate(found, now.mono),
+            "detections_3d": self._detections,
             "depth": self._camera.add_depth,
             "mask": self._camera.add_mask,
             "camera_info": self._camera.set_info,
@@ -148,7 +151,7 @@ class SensorInputs:
 
     # --- messages -----------------------------------------------------------------
 
-    def hear(
+    def receive(
         self,
         topic: str,
         arrived: Sequence[bytes],
@@ -164,7 +167,7 @@ class SensorInputs:
             form: Their type, where the topic may have several.
         """
         message = form or TOPICS[topic].message
-        self._first_heard = min(self._first_heard, now)
+        self._first_at = min(self._first_at, now)
         if topic not in _TREE:
             self._newest[topic] = message, arrived[-1]
             return
@@ -176,25 +179,27 @@ class SensorInputs:
             else:
                 self._places.add(links, static=topic == "tf_static")
 
-    def tick(self, now: Instant) -> list[Observation]:
+    def tick(self, now: Instant) -> list[Sensed]:
         """New observations, odometry first."""
         if self._began is None:
             self._began = now.mono + self._tf_max_age_s
         self._note_silence(self._began, now.mono)
         # DDS matches the topics of a base one after the other, and each node publishes
         # its own link of the chain: the first data wait for the transforms that follow.
-        if now.mono - self._first_heard <= self._tf_max_age_s:
+        if now.mono - self._first_at <= self._tf_max_age_s:
             return []
-        found = [
+        sensed = [
             self._attempt(topic, work, *newest, now)
             for topic, work in self._works.items()
             if (newest := self._newest.pop(topic, None)) is not None
         ]
-        found.append(self._camera.locate(now.mono))
-        return [observation for observation in found if observation is not None]
+        if (located := self._camera.locate(now.mono)) is not None:
+            frame, stamp = located
+            sensed.append(Sensed(frame, self._age_s("detections_2d", stamp, now)))
+        return [present for present in sensed if present is not None]
 
     def _note_silence(self, began: float, now: float) -> None:
-        # A robot may lack a laser; one whose laser says nothing new has a fault.
+        # A robot may lack a laser, but a laser that has worked must go on.
         for topic, start in (("odometry", began), ("scan", math.inf)):
             silent = now - self._used_at.get(topic, start)
             if silent > SILENT_S:
@@ -207,19 +212,32 @@ class SensorInputs:
         form: type[Message],
         payload: bytes,
         now: Instant,
-    ) -> Observation | None:
+    ) -> Sensed | None:
         """The observation of a message; None where it is unusable or old."""
         try:
             message = cdr.read(form, payload)
             is_stream = TOPICS[topic].role == "stream"
-            if is_stream and not self._is_new(topic, message.header.stamp.seconds, now):
+            stamp = message.header.stamp.seconds if is_stream else None
+            if stamp is not None and not self._is_new(topic, stamp, now):
                 return None
-            found = work(message, now)
+            observation = work(message, now)
         except UnreadableError as error:
             self._note(error.reason, topic, now.mono)
             return None
         self._used_at[topic] = now.mono
-        return found
+        age_s = 0.0 if stamp is None else self._age_s(topic, stamp, now)
+        if isinstance(observation, DetectionFrame):
+            return Sensed(observation, age_s)
+        # A wrong stamp of a pose would hide motion from a standstill (I3).
+        return None if observation is None else Sensed(observation)
+
+    def _age_s(self, topic: str, stamp: float, now: Instant) -> float:
+        """Time since a stamp (s), at most ten; a late topic is a fault."""
+        present = self._stamps["odometry"].newest if self._sim_time else now.wall
+        age_s = min(max(0.0, present - stamp), _CLOCK_OFF_S)
+        if age_s > SILENT_S:
+            self._note("data_late", topic, now.mono)
+        return age_s
 
     def _is_new(self, topic: str, stamp: float, now: Instant) -> bool:
         """Whether a message counts by its stamp."""
@@ -252,6 +270,10 @@ class SensorInputs:
         if laser is None:
             return Unplaced("", UNKNOWN_ORIGIN, "scan")
         return reading.read_scan(message, laser)
+
+    def _detections(self, message: Message, now: Instant) -> DetectionFrame:
+        topic = self._names["detections_3d"]
+        return self._places.detections(message, topic, now.mono)
 
     def _path(self, message: ros.Path, now: Instant) -> Navigation | None:
         frame, here = message.header.frame_id or self._map, self._places.here

@@ -26,7 +26,8 @@ from iveg.ros2.names import Endpoint, Qos
 
 # --- network ----------------------------------------------------------------------
 #
-# The DDS network as a robot needs it: the port of ``iveg/adapters/dds.py``.
+# The DDS network as a robot needs it: the port of ``iveg/adapters/dds.py``, which only
+# an installation with the extra ``ros2`` can import.  The gate is tested without it.
 
 
 class Reader(Protocol):
@@ -75,36 +76,33 @@ def message_of(*, stamped: bool) -> type[Message]:
 
 
 class DriveTopics:
-    """Reads ``cmd_vel_in``, writes ``cmd_vel_out``; notes what is wrong."""
+    """Reads ``cmd_vel_in``, writes ``cmd_vel_out``; notes faults of either."""
 
     def __init__(self, config: RobotConfig, input_faults: InputFaults) -> None:
-        self._drive = config.drive
+        self._drive, self._base_link = config.drive, config.frames.base_link
         self._topic = config.full_topics["cmd_vel_in"]
-        self._base_link = config.frames.base_link
-        self._input_faults = input_faults
-        self._stamps = Stamps()
+        self._input_faults, self._stamps = input_faults, Stamps()
 
     def read(self, payload: bytes, now: float) -> Twist2D | None:
-        """The twist that upstream requests; None if older than the one before."""
+        """The twist that upstream requests; None if it is not newer than the last."""
         try:
             if not self._drive.stamped_in:
                 return read_twist(cdr.read(ros.Twist, payload))
             stamped = cdr.read(ros.TwistStamped, payload)
-            return None if self._is_old(stamped, now) else read_twist(stamped.twist)
+            verdict = self._stamps.verdict(stamped.header.stamp.seconds)
+            if verdict in ("same", "back"):
+                self._input_faults.note("time_back", self._topic, now)
+                return None
+            return read_twist(stamped.twist)
         except UnreadableError as error:
             self._input_faults.note(error.reason, self._topic, now)
+            # Else the twist before it would stay in force for its half second.
             return REST
-
-    def _is_old(self, stamped: ros.TwistStamped, now: float) -> bool:
-        verdict = self._stamps.verdict(stamped.header.stamp.seconds)
-        if verdict in ("same", "back"):
-            self._input_faults.note("time_back", self._topic, now)
-        return verdict in ("same", "back")
 
     def write(self, twist: Twist2D, wall: float) -> bytes:
         """Bytes for the base; ``wall`` is the robot's clock (Unix s)."""
         if self._drive.stamped_out:
-            header = ros.Header(ros.Time.of(wall), self._base_link)
+            header = ros.Header(ros.Time.from_seconds(wall), self._base_link)
             return cdr.write(ros.TwistStamped(header, write_twist(twist)))
         return cdr.write(write_twist(twist))
 
@@ -120,8 +118,8 @@ def pose_for(
     """The pose to drive to, looking the way that leads there.
 
     Args:
-        goal: None, or one to pause: the pose where the robot is.
-        here: Where it is, in ``map``.
+        goal: None, or a pause: the pose is the robot's own.
+        here: Pose of the robot in ``map``.
         wall: The robot's clock (Unix s).
         frame: Name of ``map``.
     """
@@ -132,7 +130,7 @@ def pose_for(
         yaw = math.atan2(y - here.y, x - here.x)
     turned = ros.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
     return ros.PoseStamped(
-        ros.Header(ros.Time.of(wall), frame),
+        ros.Header(ros.Time.from_seconds(wall), frame),
         ros.Pose(ros.Point(x, y), turned),
     )
 
@@ -162,7 +160,7 @@ def cloud(
         for near in neighbours
         if own.distance_to(near.x, near.y) <= REACH_M
     ]
-    points = np.ascontiguousarray(np.concatenate([_CIRCLE, *discs]), "<f4")
+    points = np.ascontiguousarray(np.concatenate([_CLEARING, *discs]), "<f4")
     return ros.PointCloud2(
         ros.Header(stamp, frame),
         1,
@@ -177,31 +175,17 @@ def cloud(
 
 
 _ANGLES = np.arange(_RAYS) * (math.tau / _RAYS)
-_CIRCLE = np.stack(
-    (
-        (REACH_M + 1.0) * np.cos(_ANGLES),
-        (REACH_M + 1.0) * np.sin(_ANGLES),
-        np.full(_RAYS, _HEIGHT_M),
-    ),
-    axis=1,
-)
+_CIRCLE = (REACH_M + 1.0) * np.stack((np.cos(_ANGLES), np.sin(_ANGLES)))
+_CLEARING = np.column_stack((*_CIRCLE, np.full(_RAYS, _HEIGHT_M)))
 
 
 def _disc(near: Neighbour, own: Pose2D) -> NDArray[np.float64]:
-    c, s = math.cos(own.yaw), math.sin(own.yaw)
-    dx, dy = near.x - own.x, near.y - own.y
+    ahead, left = own.inverse(near.x, near.y)
     steps = np.arange(-near.body_m, near.body_m + _SPACING_M / 2, _SPACING_M)
-    x, y = (side.reshape(-1) for side in np.meshgrid(steps, steps))
+    x, y = np.meshgrid(steps, steps)
     inside = np.hypot(x, y) <= near.body_m
-    x, y = x[inside], y[inside]
-    return np.stack(
-        (
-            x + c * dx + s * dy,
-            y - s * dx + c * dy,
-            np.full(x.size, _HEIGHT_M),
-        ),
-        axis=1,
-    )
+    height = np.full(np.count_nonzero(inside), _HEIGHT_M)
+    return np.column_stack((x[inside] + ahead, y[inside] + left, height))
 
 
 # --- markers ----------------------------------------------------------------------
@@ -219,7 +203,7 @@ def markers(
 ) -> ros.MarkerArray:
     """Body, radius and name of each, with a lifetime of a second."""
     header, white = ros.Header(stamp, frame), ros.ColorRGBA(1.0, 1.0, 1.0, 1.0)
-    found: list[ros.Marker] = []
+    shapes: list[ros.Marker] = []
     for number, near in enumerate(neighbours):
         hue = (0.9, 0.2, 0.1) if near.kind == "person" else (0.1, 0.4, 0.9)
         body, zone = ros.ColorRGBA(*hue, 0.9), ros.ColorRGBA(*hue, 0.15)
@@ -239,8 +223,8 @@ def markers(
                 lifetime=ros.Duration(_MARKER_LIVES_S),
                 text=text,
             )
-            found.append(marker)
-    return ros.MarkerArray(tuple(found))
+            shapes.append(marker)
+    return ros.MarkerArray(tuple(shapes))
 
 
 # --- costmap ----------------------------------------------------------------------
@@ -258,7 +242,7 @@ class CostmapTopic:
     """Draws and publishes one robot's costmap.
 
     Args:
-        writer: Of its topic, transient local.
+        writer: Publication of its topic, transient local.
         costmap: Its cells.
         node: The robot's safety node, which gets feedback and scans of peers.
         frame: Name of ``map``.
@@ -276,30 +260,30 @@ class CostmapTopic:
         self._writer, self._costmap, self._node = writer, costmap, node
         self._frame, self._place = frame, place
         self._newest: InflatedGrid | None = None
-        node.hear_peer_scans(self._hear)
+        node.on_peer_scan(self._on_scan)
 
-    def _hear(self, topic: str, payload: bytes) -> None:
+    def _on_scan(self, topic: str, payload: bytes) -> None:
         iveg_s = self._node.machine.authors.newest_stamp_s
-        self._costmap.hear(topic, payload, self._place(), iveg_s)
+        self._costmap.receive(topic, payload, self._place(), iveg_s)
 
     async def run(self) -> None:
-        """Until cancelled."""
-        said = False
+        """Publish until cancelled."""
+        is_logged = False
         while True:
             try:
                 await self._tell()
-                said = False
+                is_logged = False
             except Exception:
-                if not said:
+                if not is_logged:
                     _log.exception("the costmap has failed; the gate goes on")
-                said = True
+                is_logged = True
             await asyncio.sleep(EVERY_S)
 
     async def _tell(self) -> None:
         own = self._place()
-        wanted = self._writer.readers > 0
-        self._node.asks_for_scans = wanted
-        if wanted and own is not None:
+        has_readers = self._writer.readers > 0
+        self._node.asks_for_scans = has_readers
+        if has_readers and own is not None:
             now, scans = clock.now(), self._costmap.drain_scans()
             present = self._node.machine.authors.neighbours(now.mono)
             self._newest = await asyncio.to_thread(
@@ -307,16 +291,13 @@ class CostmapTopic:
             )
             self._write(self._newest)
         elif self._newest is not None:
-            self._withdraw(self._newest)
-
-    def _withdraw(self, newest: InflatedGrid) -> None:
-        """Leave a grid that claims nothing to whoever listens next."""
-        nothing = np.full_like(newest.data, UNKNOWN)
-        self._write(InflatedGrid(newest.grid, nothing))
-        self._newest = None
+            # The topic is latched: a later reader would take the old grid for new.
+            nothing = np.full_like(self._newest.data, UNKNOWN)
+            self._write(InflatedGrid(self._newest.grid, nothing))
+            self._newest = None
 
     def _write(self, costmap: InflatedGrid) -> None:
-        stamp = ros.Time.of(clock.wall())
+        stamp = ros.Time.from_seconds(clock.wall())
         self._writer.write(cdr.write(occupancy_grid(costmap, stamp, self._frame)))
 
 

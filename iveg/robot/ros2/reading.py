@@ -31,14 +31,11 @@ from iveg.ros2 import messages as ros
 FASTEST_M_S = 20.0
 """Speed above which a value is refused: no vehicle in crop rows is so fast (m/s)."""
 _FARTHEST_M = 1e6
-_FARTHEST_BITS = np.float32(_FARTHEST_M).view(np.uint32)
-"""Bits of a float32 are in the order of the numbers; what is negative, infinite or no
-number is above, and one comparison finds it."""
 _NOTHING, _UNKNOWN = np.float32(np.inf), np.float32(0.0)
-"""Nothing came back; no measurement, which is shorter than any range that counts."""
+"""Ranges without a return, and without a measurement (below every valid range)."""
 _LEAST_RANGE_M = 1e-3
 _FINEST_RAD = 1e-4
-"""No laser is finer."""
+"""Angle between beams below which a scan is refused: no laser is finer."""
 _TILT = math.radians(10.0)
 _LONGEST_RANGE_M = 1e4
 _FORBIDDEN = str.maketrans(dict.fromkeys(FORBIDDEN))
@@ -102,6 +99,7 @@ def read_scan(scan: ros.LaserScan, laser: RigidTransform) -> LaserScan:
         UNKNOWN_ORIGIN,
         scan.angle_min * side,
         scan.angle_increment * side,
+        # Above 0, which stands for no measurement.
         max(_LEAST_RANGE_M, scan.range_min),
         min(scan.range_max, _LONGEST_RANGE_M),
         laser.flat(),
@@ -119,7 +117,8 @@ def _ranges(scan: ros.LaserScan) -> NDArray[np.float32]:
     for one: neither shows that the way is free.
     """
     ranges: NDArray[np.float32] = scan.ranges.copy()
-    odd = ranges.view(np.uint32) > _FARTHEST_BITS
+    # Comparisons with NaN are false.
+    odd = ~((ranges > 0.0) & (ranges <= _FARTHEST_M))
     ranges[odd] = np.where(ranges[odd] > 0.0, _NOTHING, _UNKNOWN)
     return ranges
 
@@ -151,7 +150,7 @@ def read_detection(detection: ros.Detection3D, place: RigidTransform) -> Detecti
         raise UnreadableError("not_a_number", "a box")
     x, y, z = (side / 2 for side in sides)
     corners = corners_of(Box3D(-x, x, -y, y, -z, z))
-    hull = within_world(hull_of(place.compose(box).of(corners)))
+    hull = within_world(hull_of(place.compose(box).apply(corners)))
     det_id = clean(detection.id) or None
     return Detection(class_id, probability, hull, "map", det_id)
 
@@ -212,14 +211,14 @@ def read_path(path: ros.Path, place: RigidTransform) -> Navigation:
     Raises:
         UnreadableError: ``not_a_number``.
     """
-    step = max(1, math.ceil(len(path.poses) / (MAX_PATH - 1)))
-    poses = [*path.poses[:-1:step], *path.poses[-1:]]
+    stride = max(1, math.ceil(len(path.poses) / (MAX_PATH - 1)))
+    poses = [*path.poses[:-1:stride], *path.poses[-1:]]
     points = np.array([(p.pose.position.x, p.pose.position.y, 0.0) for p in poses])
     if not points.size:
         return Navigation("", UNKNOWN_ORIGIN, "idle")
     if not (np.abs(points) <= _FARTHEST_M).all():
         raise UnreadableError("not_a_number", "a path")
-    way = tuple((float(x), float(y)) for x, y, _ in place.of(points))
+    way = tuple((float(x), float(y)) for x, y, _ in place.apply(points))
     return Navigation("", UNKNOWN_ORIGIN, "navigating", way[-1], way)
 
 
@@ -249,6 +248,7 @@ class Stamps:
         if back_s == 0.0 or 0.0 < back_s < _SET_BACK_S:
             return "back" if back_s else "same"
         self.newest = stamp
+        # A stamp far back is of a clock that was set: refusals would blind the robot.
         return "new" if stamp > before else "reset"
 
 

@@ -40,7 +40,7 @@ _log = logging.getLogger(__name__)
 RATE_HZ = 30.0
 _WISH_HZ = 100.0
 _LOOK_ROUND_TICKS, _TELL_TICKS = 15, 6
-"""Ticks between two checks of endpoints, and between two outputs of neighbours."""
+"""Ticks from a check of endpoints, or an output of neighbours, to the next."""
 
 
 class Ros2Robot:
@@ -69,12 +69,10 @@ class Ros2Robot:
         self._network = network
         self.inputs, self._faults = inputs, inputs.input_faults
         self._topics = DriveTopics(config, self._faults)
-        self._fleet_costmap = FleetCostmap(
-            robot_id,
-            Outline(profile.length, profile.width),
-            None if settings.plan is None else settings.plan.bounds,
-        )
-        self._said: frozenset[tuple[str, str]] = frozenset()
+        outline, plan = Outline(profile.length, profile.width), settings.limits.plan
+        bounds = None if plan is None else plan.bounds
+        self._fleet_costmap = FleetCostmap(robot_id, outline, bounds)
+        self._logged: frozenset[tuple[str, str]] = frozenset()
         self._lookout = Lookout(config, self._faults, clock.mono())
         self._ticks = itertools.count()
         self._open(network)
@@ -90,6 +88,7 @@ class Ros2Robot:
     def _open(self, network: Network) -> None:
         quality, drive = self._config.quality, self._config.drive
         self._subscriptions = Subscriptions(self._config, network)
+        # Depth 1: of several waiting twists only the newest may drive.
         self._wishes = network.reader(
             self._names["cmd_vel_in"],
             message_of(stamped=drive.stamped_in),
@@ -145,8 +144,9 @@ class Ros2Robot:
     def _sense(self) -> None:
         now = clock.now()
         for topic, form, waited in self._subscriptions.take():
-            self.inputs.hear(topic, waited, now.mono, form)
-        self.node.sense(*self.inputs.tick(now))
+            self.inputs.receive(topic, waited, now.mono, form)
+        for sensed in self.inputs.tick(now):
+            self.node.sense(sensed.observation, age_s=sensed.age_s)
         self._judge(now.mono)
 
     def _judge(self, now: float) -> None:
@@ -157,12 +157,12 @@ class Ros2Robot:
 
     def _log(self, faults: tuple[RobotFault, ...]) -> None:
         """Log each fault once at its start and once at its end."""
-        said = frozenset((fault.code, fault.about) for fault in faults)
-        for code, about in said - self._said:
-            _log.warning("%s: %s, %s", self._id, code, about)
-        for code, about in self._said - said:
-            _log.warning("%s: over: %s, %s", self._id, code, about)
-        self._said = said
+        present = frozenset((fault.code, fault.about) for fault in faults)
+        for code, about in present - self._logged:
+            _log.warning("%s: fault %s, %s", self._id, code, about)
+        for code, about in self._logged - present:
+            _log.warning("%s: fault %s is over, %s", self._id, code, about)
+        self._logged = present
 
     def _take_wish(self, _: float) -> None:
         """Hand the newest twist of navigation to the gate."""
@@ -172,7 +172,7 @@ class Ros2Robot:
             self.node.request_twist(wish)
 
     def _look_round(self) -> None:
-        """Check the endpoints of others, and listen to those that have joined."""
+        """Check the endpoints of others, and subscribe to those that have joined."""
         endpoints = self._network.endpoints()
         self._lookout.look(endpoints, clock.mono())
         self._subscriptions.meet(endpoints)
@@ -182,15 +182,14 @@ class Ros2Robot:
     def _drive(self, twist: Twist2D) -> None:
         try:
             self._out.write(self._topics.write(twist, clock.wall()))
-        except HopError as error:
+        except HopError:
             # No command arrives, so the base halts by its own time-out.
-            _log.debug("%s: %s", self._id, error)
             out = self._names["cmd_vel_out"]
             self._faults.note("drive_refused", out, clock.mono())
 
     def navigate(self, goal: Goal | None) -> bool:
-        """Publish a goal; a topic takes none back, so to give up is to stay here."""
-        writer, own = _heard(self._goal), self.inputs.pose()
+        """Publish a goal; None sends the own pose, as no topic takes a goal back."""
+        writer, own = _subscribed(self._goal), self.inputs.pose()
         if writer is None or own is None:
             return False
         frame = self._config.frames.map
@@ -203,22 +202,21 @@ class Ros2Robot:
 
     def _tell_neighbours(self) -> None:
         own, frames = self.inputs.pose(), self._config.frames
-        cloud, drawing = _heard(self._cloud), _heard(self._markers)
+        cloud, drawing = _subscribed(self._cloud), _subscribed(self._markers)
         if own is None or (cloud is None and drawing is None):
             return
         now = clock.now()
         stamp, present = (
-            ros.Time.of(now.wall),
+            ros.Time.from_seconds(now.wall),
             self.node.machine.authors.neighbours(now.mono),
         )
         if cloud is not None:
-            found = outputs.cloud(present, own, stamp, frames.base_link)
-            cloud.write(cdr.write(found))
+            points = outputs.cloud(present, own, stamp, frames.base_link)
+            cloud.write(cdr.write(points))
         if drawing is not None:
-            drawn = outputs.markers(present, stamp, frames.map)
-            drawing.write(cdr.write(drawn))
+            drawing.write(cdr.write(outputs.markers(present, stamp, frames.map)))
 
 
-def _heard(writer: Writer | None) -> Writer | None:
+def _subscribed(writer: Writer | None) -> Writer | None:
     """The writer if it has subscribers."""
     return writer if writer is not None and writer.readers else None

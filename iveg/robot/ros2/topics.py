@@ -28,8 +28,7 @@ def read_battery(state: ros.BatteryState) -> Battery:
     elif share > 1.0:
         share /= 100.0
     volts = state.voltage if math.isfinite(state.voltage) else None
-    charging = {1: True, 2: False, 3: False, 4: False}
-    status = charging.get(state.power_supply_status)
+    status = {1: True, 2: False, 3: False, 4: False}.get(state.power_supply_status)
     return Battery("", UNKNOWN_ORIGIN, share, status, volts)
 
 
@@ -45,13 +44,13 @@ class RosSensor:
     """One row.
 
     Attributes:
-        of: What it observes; the key in ``robot.toml`` is the kind's name.
+        observation: Its class; the key in ``robot.toml`` is the kind's name.
         topic: Its name by default.
         read: Message → observation.  Raises UnreadableError.
         write: Header and observation → message.
     """
 
-    of: type[Observation]
+    observation: type[Observation]
     topic: str
     message: type[Message]
     read: Callable[[Any], Observation]
@@ -60,11 +59,11 @@ class RosSensor:
     @property
     def kind(self) -> Kind:
         """Its row among the observations."""
-        return row_of(self.of)
+        return row_of(self.observation)
 
     @property
     def every_s(self) -> float:
-        """Least time between two that are sent on (s)."""
+        """Least time between two readings that are sent to iVeg (s)."""
         return self.kind.sensor.every_s if self.kind.sensor else 0.0
 
 
@@ -80,15 +79,15 @@ ROS_SENSORS = {
         ),
     )
 }
-"""By name.  A small sensor that is missing here has no ROS 2 form."""
+"""Rows by name.  A small sensor that is missing here has no ROS 2 form."""
 
 
 # --- detectors --------------------------------------------------------------------
 #
 # Detections of each family of messages, as those of ``vision_msgs``.
 #
-# A box of a picture that lies over its left or upper edge comes from YOLOX-ROS as a
-# negative number in 16 bits without a sign.
+# YOLOX-ROS writes a box over the left or upper edge of its picture as negative numbers
+# into 16 bits without a sign.
 
 _SIGN, _WRAP = 1 << 15, 1 << 16
 
@@ -99,17 +98,13 @@ class Look:
 
     Attributes:
         header: Of the picture.
-        width: Of the picture (pixels), ``height`` likewise; 0: not told.
+        width: Of the picture (pixels), ``height`` likewise; 0: unknown.
     """
 
     header: ros.Header
     detections: tuple[ros.Detection2D, ...]
     width: int = 0
     height: int = 0
-
-
-def _vision(look: ros.Detection2DArray) -> Look:
-    return Look(look.header, tuple(look.detections))
 
 
 def _yolox(look: d.BoundingBoxes) -> Look:
@@ -120,65 +115,49 @@ def _yolox(look: d.BoundingBoxes) -> Look:
     return Look(header, tuple(map(_yolox_box, boxes)), width, height)
 
 
-def _yolox_box(seen: d.BoundingBox) -> ros.Detection2D:
+def _yolox_box(yolox: d.BoundingBox) -> ros.Detection2D:
     xmin, ymin, xmax, ymax = (
         float(edge - _WRAP if edge >= _SIGN else edge)
-        for edge in (seen.xmin, seen.ymin, seen.xmax, seen.ymax)
+        for edge in (yolox.xmin, yolox.ymin, yolox.xmax, yolox.ymax)
     )
     centre = ros.Point2D((xmin + xmax) / 2, (ymin + ymax) / 2)
     box = ros.BoundingBox2D(ros.PicturePose(centre), xmax - xmin, ymax - ymin)
-    return ros.Detection2D(ros.Header(), _sure(seen.class_id, seen.probability), box)
+    return ros.Detection2D(ros.Header(), _sure(yolox.class_id, yolox.probability), box)
 
 
-def _yolo(look: d.DetectionArray) -> Look:
-    return Look(look.header, tuple(map(_yolo_box, look.detections)))
-
-
-def _yolo_box(seen: d.Detection) -> ros.Detection2D:
-    centre, size = seen.bbox.center, seen.bbox.size
+def _yolo_box(yolo: d.Detection) -> ros.Detection2D:
+    centre, size = yolo.bbox.center, yolo.bbox.size
     place = ros.PicturePose(
         ros.Point2D(centre.position.x, centre.position.y), centre.theta
     )
     box = ros.BoundingBox2D(place, size.x, size.y)
-    return ros.Detection2D(ros.Header(), _yolo_class(seen), box, seen.id)
+    return ros.Detection2D(ros.Header(), _yolo_class(yolo), box, yolo.id)
 
 
-def _yolo_3d(found: d.DetectionArray) -> ros.Detection3DArray:
-    return ros.Detection3DArray(
-        found.header, tuple(map(_yolo_box_3d, found.detections))
-    )
-
-
-def _yolo_box_3d(seen: d.Detection) -> ros.Detection3D:
-    box = seen.bbox3d
-    # Without a frame no node has added depth, and zeros are no place.
+def _yolo_box_3d(yolo: d.Detection) -> ros.Detection3D:
+    box = yolo.bbox3d
+    # Without a frame no node has added depth: the zeros in the box are no place.
     centre = box.center if box.frame_id else ros.Pose(ros.Point(math.nan))
     header = ros.Header(frame_id=box.frame_id)
-    found = ros.BoundingBox3D(centre, box.size)
-    return ros.Detection3D(header, _yolo_class(seen), found, seen.id)
+    bounds = ros.BoundingBox3D(centre, box.size)
+    return ros.Detection3D(header, _yolo_class(yolo), bounds, yolo.id)
 
 
-def _yolo_class(seen: d.Detection) -> tuple[ros.ObjectHypothesisWithPose, ...]:
-    return _sure(seen.class_name or str(seen.class_id), seen.score)
+def _yolo_class(yolo: d.Detection) -> tuple[ros.ObjectHypothesisWithPose, ...]:
+    return _sure(yolo.class_name or str(yolo.class_id), yolo.score)
 
 
-def _yolact(found: d.BoundingBoxes3d) -> ros.Detection3DArray:
-    return ros.Detection3DArray(
-        found.header, tuple(map(_yolact_box, found.bounding_boxes))
-    )
-
-
-def _yolact_box(seen: d.BoundingBox3d) -> ros.Detection3D:
+def _yolact_box(hull: d.BoundingBox3d) -> ros.Detection3D:
     centre = ros.Point(
-        (seen.xmin + seen.xmax) / 2,
-        (seen.ymin + seen.ymax) / 2,
-        (seen.zmin + seen.zmax) / 2,
+        (hull.xmin + hull.xmax) / 2,
+        (hull.ymin + hull.ymax) / 2,
+        (hull.zmin + hull.zmax) / 2,
     )
     size = ros.Vector3(
-        seen.xmax - seen.xmin, seen.ymax - seen.ymin, seen.zmax - seen.zmin
+        hull.xmax - hull.xmin, hull.ymax - hull.ymin, hull.zmax - hull.zmin
     )
     box = ros.BoundingBox3D(ros.Pose(centre), size)
-    return ros.Detection3D(ros.Header(), _sure(seen.object_name, seen.probability), box)
+    return ros.Detection3D(ros.Header(), _sure(hull.object_name, hull.probability), box)
 
 
 def _sure(class_id: str, score: float) -> tuple[ros.ObjectHypothesisWithPose, ...]:
@@ -186,16 +165,22 @@ def _sure(class_id: str, score: float) -> tuple[ros.ObjectHypothesisWithPose, ..
 
 
 LOOKS: Mapping[type[Message], Callable[[Any], Look]] = {
-    ros.Detection2DArray: _vision,
+    ros.Detection2DArray: lambda look: Look(look.header, tuple(look.detections)),
     d.BoundingBoxes: _yolox,
-    d.DetectionArray: _yolo,
+    d.DetectionArray: lambda look: Look(
+        look.header, tuple(map(_yolo_box, look.detections))
+    ),
 }
 """Boxes in a picture, by type; they need its depth."""
 
 BOXES: Mapping[type[Message], Callable[[Any], ros.Detection3DArray]] = {
-    ros.Detection3DArray: lambda found: found,
-    d.BoundingBoxes3d: _yolact,
-    d.DetectionArray: _yolo_3d,
+    ros.Detection3DArray: lambda boxes: boxes,
+    d.BoundingBoxes3d: lambda boxes: ros.Detection3DArray(
+        boxes.header, tuple(map(_yolact_box, boxes.bounding_boxes))
+    ),
+    d.DetectionArray: lambda boxes: ros.Detection3DArray(
+        boxes.header, tuple(map(_yolo_box_3d, boxes.detections))
+    ),
 }
 """Boxes with a place, by type."""
 
@@ -205,9 +190,9 @@ BOXES: Mapping[type[Message], Callable[[Any], ros.Detection3DArray]] = {
 # Topics of a ROS 2 robot: one row each, in the order in which they are read.
 
 Role = Literal["stream", "state", "picture", "transforms", "drive", "output"]
-"""``stream``: old messages do not count; ``state``: the newest counts; ``picture``: one
-of which few may be pending; ``transforms``: every message counts; ``drive``: on either
-side of the gate, stamped or not; ``output``: what goals and neighbours go out on."""
+"""``stream``: old messages do not count; ``state``: the newest counts; ``picture``: few
+may be pending; ``transforms``: every message counts; ``drive``: on either side of the
+gate, stamped or not; ``output``: for goals, neighbours and the costmap."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,7 +253,7 @@ TOPICS: Mapping[str, RosTopic] = {
     # The fleet's picture, for Nav2's static layer.
     "costmap": RosTopic("iveg/costmap", ros.OccupancyGrid, "output", LATCHED),
 }
-"""By key in ``robot.toml``."""
+"""Rows by key in ``robot.toml``."""
 
 _CAMERA = frozenset({"depth", "camera_info", "mask"})
 

@@ -35,7 +35,7 @@ class RigidTransform:
         x, y, z = self.matrix[:3, 3].tolist()
         return x, y, z
 
-    def of(self, points: Matrix) -> Matrix:
+    def apply(self, points: Matrix) -> Matrix:
         """Points of the inner frame in the outer one; shape (n, 3), (m)."""
         moved: Matrix = points @ self.matrix[:3, :3].T + self.matrix[:3, 3]
         return moved
@@ -62,7 +62,7 @@ class RigidTransform:
         return math.acos(max(-1.0, min(1.0, self.matrix[2, 2])))
 
     def towards(self, later: "RigidTransform", part: float) -> "RigidTransform":
-        """A share (0 to 1) of the way, of a turn that is small."""
+        """Transform at a share (0 to 1) of the way to a later one; for small turns."""
         between = (1.0 - part) * self.matrix + part * later.matrix
         # The rotation nearest to the mean of two.
         left, _, right = np.linalg.svd(between[:3, :3])
@@ -82,13 +82,11 @@ def rigid_of(
     square = x * x + y * y + z * z + w * w
     if not (1e-12 < square < math.inf and all(map(math.isfinite, move))):
         return None
-    s = 2.0 / square
+    # Rodrigues' formula, with the quaternion's vector as a cross product.
+    cross = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
     matrix = np.eye(4)
-    matrix[:3] = (
-        (1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y), move[0]),
-        (s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x), move[1]),
-        (s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y), move[2]),
-    )
+    matrix[:3, :3] += 2.0 / square * (w * cross + cross @ cross)
+    matrix[:3, 3] = move
     return RigidTransform(matrix)
 
 
@@ -158,7 +156,7 @@ class TransformBuffer:
         self._links: dict[str, _Link] = {}
 
     def add(self, message: ros.TFMessage, *, static: bool) -> None:
-        """Take a message of ``/tf`` or ``/tf_static``, but what is unusable in it."""
+        """Take a message of ``/tf`` or ``/tf_static``; unusable links are left out."""
         for transform in message.transforms:
             self._add(transform, static=static)
 
@@ -169,6 +167,7 @@ class TransformBuffer:
         if rigid is None or not parent or not child or parent == child:
             return
         link = self._links.get(child)
+        # Anything on the network may publish frames: they must not fill the memory.
         if link is None and len(self._links) >= MOST_FRAMES:
             return
         if link is None or link.parent != parent or link.static != static:
@@ -196,10 +195,11 @@ class TransformBuffer:
 
     def chain(self, frame: str) -> list[str]:
         """A frame and all its ancestors."""
-        found = [frame]
-        while (link := self._links.get(found[-1])) and len(found) < _DEEPEST:
-            found.append(link.parent)
-        return found
+        frames = [frame]
+        # Bounded, as a broken tree may have a loop.
+        while (link := self._links.get(frames[-1])) and len(frames) < _DEEPEST:
+            frames.append(link.parent)
+        return frames
 
     def _climb(self, frames: Iterable[str], stamp: float) -> RigidTransform:
         """Pose of the first of these frames in the parent of the last."""

@@ -1,8 +1,8 @@
 """Access over HTTP: one's own account, sessions, accounts of others, programs.
 
-A sign-in link, an invitation and a token are passwords: each leaves by the one answer
-that somebody asked it by, and no cache keeps it.  A session is named by an id of its
-own: neither its token nor its digest leaves.
+A sign-in link, an invitation and a token are passwords: each leaves in a single answer,
+which no cache keeps.  A session is named by an id of its own: neither its token nor its
+digest leaves.
 """
 
 from functools import partial
@@ -35,7 +35,7 @@ from iveg.models.access import (
     SignInCode,
     UserAccount,
 )
-from iveg.models.base import Body, Listing, stamp
+from iveg.models.base import Body, Listing
 from iveg.web.api.answers import Json
 from iveg.web.problems import Problem
 from iveg.web.security.people import People
@@ -61,28 +61,28 @@ def sessions_router() -> APIRouter:
 
 
 def _add(routes: APIRouter, path: str, action: Action, *, everybodys: bool) -> None:
-    """List and end the sessions that somebody may see."""
+    """List and end the sessions that the caller may see."""
     visitor = Annotated[Principal, Depends(require(action))]
 
     def seen_by(request: Request, who: Principal) -> list[tuple[Session, Role]]:
         standing = authenticator_of(request).sessions.standing()
-        # The one of a program is nobody's, and has no session.
+        # A program has no sessions, whatever its id is.
         own = None if who.session is None else who.person
         return [shown for shown in standing if everybodys or shown[0].person == own]
 
     @routes.get(path, response_model=Listing[OpenSession])
     async def listed(request: Request, who: visitor) -> Response:
-        """Those that are not over; the newest first."""
+        """Sessions that are not over, newest first."""
         seen = seen_by(request, who)
         seen.sort(key=lambda shown: shown[0].began, reverse=True)
         return Json(Listing(items=[_open_session(*shown, who) for shown in seen]))
 
     @routes.delete(f"{path}/{{session_id}}", response_model=OpenSession)
     async def end(request: Request, session_id: str, who: visitor) -> Response:
-        """End one at once, STOP included."""
+        """End a session at once, STOP included."""
         for session, role in seen_by(request, who):
             if session.session_id == session_id:
-                authenticator_of(request).sessions.end(session.key)
+                authenticator_of(request).sessions.end(session.digest)
                 return Json(_open_session(session, role, who))
         raise UnknownNameError("session", session_id)
 
@@ -95,39 +95,36 @@ def _open_session(session: Session, role: Role, who: Principal) -> OpenSession:
         role=role,
         kind=kind,
         began_at=format_stamp(session.began),
-        own=session.key == who.session,
+        own=session.digest == who.session,
     )
 
 
 class PasswordBody(Body):
-    """The password that was, and the one that is to be."""
+    """The old password and the new password."""
 
     old: str = Field(max_length=MOST)
     new: str = Field(min_length=LEAST, max_length=MOST)
 
 
 def router(people: People) -> APIRouter:
-    """The routes of whoever asks, about themselves."""
+    """Routes of the caller's own account."""
     routes = APIRouter(prefix="/api/v1/account", tags=["account"])
 
     @routes.get("", response_model=OwnAccount)
     async def own(who: Reader) -> Response:
-        """Name, role and end of whoever asks."""
+        """Name, role and end of the caller's account."""
         account = people.known.get(who.person)
         return Json(
-            OwnAccount(
-                name=who.name,
-                role=who.role,
-                method=who.method,
+            OwnAccount.from_value(
+                who,
                 account=who.has_account,
-                signed_in_at=stamp(who.signed_in_at),
-                ends_at=stamp(account.ends_at if account else None),
+                ends_at=account.ends_at if account else None,
             )
         )
 
     @routes.put("/password", status_code=204)
     async def change(request: Request, body: PasswordBody, who: Reader) -> Response:
-        """Change the password; every session ends but this one, which begins anew."""
+        """Change the password; other sessions end, and this session begins anew."""
         prove = authenticator_of(request).prove
         proof = partial(people.change_password, who, body.old, body.new)
         try:
@@ -141,7 +138,7 @@ def router(people: People) -> APIRouter:
 
 
 def code_of(request: Request, proof: str) -> SignInCode:
-    """A link to sign in by, at the address by which this browser has reached iVeg."""
+    """Sign-in link at the address by which this browser has reached iVeg."""
     link = f"{str(request.base_url).rstrip('/')}/signin#{proof}"
     image = segno.make(link, micro=False).svg_data_uri(
         scale=_SCALE, border=4, dark="#000", light="#fff"
@@ -150,24 +147,24 @@ def code_of(request: Request, proof: str) -> SignInCode:
 
 
 class _Newcomer(Body):
-    """Somebody, or a program, that ends by itself after so many `days`."""
+    """A new person or program, which ends by itself after `days`."""
 
     name: str = Field(max_length=MOST_NAME)
     days: Annotated[int, Field(ge=1, le=3650)] | None = None
 
     def ends_at(self, now: float) -> float | None:
-        """When it ends by itself (Unix s); None: never."""
+        """Time at which it ends by itself (Unix s); None: never."""
         return None if self.days is None else now + self.days * DAY_S
 
 
 class UserBody(_Newcomer):
-    """Somebody new; `days` until the account ends by itself."""
+    """A new person; `days` until the account ends by itself."""
 
     role: PersonRole
 
 
 class RoleBody(Body):
-    """The role that is to be."""
+    """The new role."""
 
     role: PersonRole
 
@@ -184,26 +181,28 @@ def users_router(people: People) -> APIRouter:
     async def users(who: Admin) -> Response:
         """Every account, by name."""
         now = people.clock().wall
+        known = sorted(
+            people.known.values(), key=lambda account: name_key(account.name)
+        )
         items = [
-            UserAccount.of(account, now, own=account.account_id == who.person)
-            for account in people.known.values()
+            UserAccount.from_account(account, now, own=account.account_id == who.person)
+            for account in known
         ]
-        items.sort(key=lambda user: name_key(user.name))
         return Json(Listing(items=items))
 
     @routes.post("", response_model=Invitation, status_code=201)
     async def invite(request: Request, body: UserBody, who: Admin) -> Response:
         """Add an account, and show its invitation this once."""
         now = people.clock().wall
-        made = people.admission(who).add(body.name, body.role, body.ends_at(now))
-        return invitation(request, made, now, 201)
+        added = people.admission(who).add(body.name, body.role, body.ends_at(now))
+        return invitation(request, added, now, 201)
 
     def invitation(
-        request: Request, made: tuple[str, Account], now: float, status: int
+        request: Request, added: tuple[str, Account], now: float, status: int
     ) -> Response:
-        token, account = made
+        token, account = added
         code = code_of(request, f"invitation={token}") if token else None
-        shown = Invitation(user=UserAccount.of(account, now), code=code)
+        shown = Invitation(user=UserAccount.from_account(account, now), code=code)
         return Json(shown, status)
 
     @routes.put("/{user_id}/role", response_model=UserAccount)
@@ -212,35 +211,35 @@ def users_router(people: People) -> APIRouter:
         changed = people.admission(who).give_role(
             _other(people, user_id, who), body.role
         )
-        return Json(UserAccount.of(changed, people.clock().wall))
+        return Json(UserAccount.from_account(changed, people.clock().wall))
 
     @routes.post("/{user_id}/reset", response_model=Invitation)
     async def reset(request: Request, user_id: str, who: Admin) -> Response:
-        """Take a password away, let in who was shut out, and invite again."""
-        made = people.admission(who).reset(_other(people, user_id, who))
-        return invitation(request, made, people.clock().wall, 200)
+        """Remove a password, enable the account, and invite anew."""
+        added = people.admission(who).reset(_other(people, user_id, who))
+        return invitation(request, added, people.clock().wall, 200)
 
     @routes.post("/{user_id}/disable", response_model=UserAccount)
     async def disable(user_id: str, who: Admin) -> Response:
-        """Shut somebody out at once, STOP included."""
-        off = people.admission(who).disable(_other(people, user_id, who))
-        return Json(UserAccount.of(off, people.clock().wall))
+        """Shut a person out at once, STOP included."""
+        disabled = people.admission(who).disable(_other(people, user_id, who))
+        return Json(UserAccount.from_account(disabled, people.clock().wall))
 
     return routes
 
 
 def _other(people: People, user_id: str, who: Principal) -> Account:
-    """The account of somebody else: whoever changes accounts stays admin."""
+    """The account of another person; nobody changes their own, so an admin remains."""
     if user_id == who.person:
         raise HTTPException(409, "Another admin changes your own account.")
-    found = people.known.get(user_id)
-    if found is None:
+    account = people.known.get(user_id)
+    if account is None:
         raise UnknownNameError("account", user_id)
-    return found
+    return account
 
 
 class TokenBody(_Newcomer):
-    """A program that is to come; `days` until its token ends by itself."""
+    """A new program; `days` until its token ends by itself."""
 
     scope: TokenScope
 
@@ -260,7 +259,9 @@ def tokens_router(people: People) -> APIRouter:
             people.book.tokens.values(), key=lambda token: name_key(token.name)
         )
         now = people.clock().wall
-        return Json(Listing(items=[ProgramToken.of(token, now) for token in known]))
+        return Json(
+            Listing(items=[ProgramToken.from_token(token, now) for token in known])
+        )
 
     @routes.post("", response_model=NewToken, status_code=201)
     async def give(body: TokenBody, who: Admin) -> Response:
@@ -269,8 +270,8 @@ def tokens_router(people: People) -> APIRouter:
         token, program = people.admission(who).give_token(
             body.name, body.scope, body.ends_at(now)
         )
-        shown = NewToken(program=ProgramToken.of(program, now), token=token)
-        return Json(shown, 201)
+        new_token = NewToken(program=ProgramToken.from_token(program, now), token=token)
+        return Json(new_token, 201)
 
     @routes.delete("/{token_id}", status_code=204)
     async def revoke(token_id: str, who: Admin) -> None:

@@ -20,12 +20,12 @@ from iveg.models.history import AcknowledgedAlerts, Alert, Note
 from iveg.vital.evaluate import Evaluator
 from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.api.history_filters import Moment, Span, seconds
+from iveg.web.api.history_filters import Moment, RecordId, Span, seconds
 from iveg.web.pages.sentences import local_stamp
 from iveg.web.security.requirements import READERS, Operator
 
 MOST_TOGETHER = 200
-"""More alerts at once nobody has read."""
+"""Alerts in one acknowledgement: nobody has read more of them at once."""
 
 
 class Acknowledgement(BaseModel):
@@ -40,7 +40,7 @@ class AcknowledgementTogether(Acknowledgement):
     """The alerts that the person saw in a list, and the note on all of them."""
 
     alert_ids: Annotated[
-        list[Annotated[str, Field(pattern=r"^[ -~]{1,64}$")]],
+        list[RecordId],
         Field(max_length=MOST_TOGETHER),
     ]
 
@@ -55,27 +55,27 @@ def router(evaluator: Evaluator, clock: Clock) -> APIRouter:
         body: Acknowledgement,
         who: Operator,
     ) -> Response:
-        """Say that somebody has seen it; it stays listed while it is active."""
+        """Acknowledge an alert; it stays listed while it is active."""
         note = clean_text(body.note)
-        found = evaluator.alerts.acknowledge(alert_id, who.name, note, clock())
-        if found is None:
+        alert = evaluator.alerts.acknowledge(alert_id, who.name, note, clock())
+        if alert is None:
             raise HTTPException(404, "There is no such alert.")
-        return Json(Alert.of(found))
+        return Json(Alert.from_alert(alert))
 
     @routes.post("/alerts/acknowledge", response_model=AcknowledgedAlerts)
     async def acknowledge_together(
         body: AcknowledgementTogether,
         who: Operator,
     ) -> Response:
-        """Say that somebody has seen a list; a P1 is left to be seen by itself."""
+        """Acknowledge a list of alerts; each P1 is left to be acknowledged singly."""
         note = clean_text(body.note)
-        seen = evaluator.alerts.acknowledge_together(
+        acknowledged = evaluator.alerts.acknowledge_together(
             body.alert_ids, who.name, note, clock()
         )
-        ids = {one.alert_id for one in seen}
-        left = [one for one in body.alert_ids if one not in ids]
-        items = [Alert.of(one) for one in seen]
-        return Json(AcknowledgedAlerts(items=items, left=left))
+        ids = {alert.alert_id for alert in acknowledged}
+        other_ids = [alert_id for alert_id in body.alert_ids if alert_id not in ids]
+        items = [Alert.from_alert(alert) for alert in acknowledged]
+        return Json(AcknowledgedAlerts(items=items, left=other_ids))
 
     return routes
 
@@ -85,11 +85,10 @@ MOST_TEXT = 1000
 LONGEST_AGO_S = 400 * 86_400.0
 _FARTHEST_M = 1e4
 _Metres = Annotated[float, Field(ge=-_FARTHEST_M, le=_FARTHEST_M)]
-_Id = Annotated[str, Field(pattern=r"^[ -~]{1,64}$")]
 
 
 class NoteRequest(BaseModel):
-    """A note to write down; without a time it is about now."""
+    """A note; without a time it is about now."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -97,8 +96,8 @@ class NoteRequest(BaseModel):
     at: Moment | None = None
     x: _Metres | None = None
     y: _Metres | None = None
-    robot_id: _Id | None = None
-    decision_id: _Id | None = None
+    robot_id: RecordId | None = None
+    decision_id: RecordId | None = None
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
@@ -114,12 +113,12 @@ def notes_router(
     log: Callable[[LogEvent, Instant], None],
     clock: Clock,
 ) -> APIRouter:
-    """Read by all, written by operators.
+    """Routes of notes: read by all, written by operators.
 
     Args:
         queries: The history.
         log: Takes the lines.
-        clock: What a note without a time is about.
+        clock: Moment of a note without a time.
     """
     routes = APIRouter(prefix="/api/v1", tags=["history"])
 
@@ -128,16 +127,16 @@ def notes_router(
         response_model=Listing[Note],
         dependencies=READERS,
     )
-    async def notes(asked: Annotated[Span, Query()]) -> Response:
-        """Notes by when they were written, newest first."""
-        since, until = seconds(asked.since), seconds(asked.until)
-        wanted = lists.Filter(since=since, until=until, limit=lists.MOST_ROWS)
-        page = await queries.page(lists.NOTES, wanted)
-        return Json(Listing(items=[Note.from_record(one) for one in page.items]))
+    async def notes(span: Annotated[Span, Query()]) -> Response:
+        """Notes by their time of writing, newest first."""
+        since, until = seconds(span.since), seconds(span.until)
+        filters = lists.Filter(since=since, until=until, limit=lists.MOST_ROWS)
+        page = await queries.page(lists.NOTES, filters)
+        return Json(Listing(items=[Note.from_record(line) for line in page.items]))
 
     @routes.post("/notes", status_code=201)
     async def write(body: NoteRequest, who: Operator) -> dict[str, str]:
-        """Write one down; it cannot be taken back."""
+        """Write a note, which cannot be taken back."""
         now = clock()
         pinned_at = now.wall if body.at is None else body.at.timestamp()
         if not now.wall - LONGEST_AGO_S <= pinned_at <= now.wall:
@@ -145,6 +144,7 @@ def notes_router(
         slots: dict[str, Slot] = {
             "by": who.name,
             "text": body.text,
+            # The sentence shows Madrid's time; programs read the seconds.
             "pinned": local_stamp(pinned_at),
             "pinned_at": pinned_at,
         }

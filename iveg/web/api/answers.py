@@ -1,14 +1,8 @@
-"""Answers to programs and the page: models as JSON, written once; long work apart."""
-
-from collections.abc import Callable
-from typing import ParamSpec, Protocol, TypeVar
+"""Answers to programs and the page: models as JSON, written once."""
 
 from starlette.responses import Response
 
 from iveg.models.base import write_json
-
-_P = ParamSpec("_P")
-_T = TypeVar("_T")
 
 
 class Json(Response):
@@ -19,16 +13,3 @@ class Json(Response):
     def render(self, content: object) -> bytes:
         """The bytes of the answer."""
         return write_json(content)
-
-
-class Apart(Protocol):
-    """Where work runs that would hold up the loop: ``adapters.worker``."""
-
-    async def run(
-        self, work: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs
-    ) -> _T:
-        """Run a function of a module there, and return its answer.
-
-        Raises:
-            HopError: it raised one, or could not be done.
-        """

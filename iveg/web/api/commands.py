@@ -28,7 +28,7 @@ class ReleaseRequest(BaseModel):
 
 
 def router(commander: Commander, clock: Clock) -> APIRouter:
-    """Commands to robots."""
+    """Routes of STOP, release and resume."""
     routes = APIRouter(prefix="/api/v1", tags=["commands"])
 
     @routes.post(
@@ -39,6 +39,7 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
     )
     async def stop(request: Request, robot_id: str, who: Presser) -> Response:
         """STOP one robot, on every transport at once."""
+        # Read by hand: a declared body could be refused (422), and a STOP never is.
         press = await press_of(request)
         pressed = await commander.stop([robot_id], who.name, clock(), press)
         return Json(Pressed.from_value(pressed[0]), 202)
@@ -54,7 +55,8 @@ def router(commander: Commander, clock: Clock) -> APIRouter:
         press = await press_of(request)
         pressed = await commander.stop(commander.machines, who.name, clock(), press)
         return Json(
-            FleetPressed(commands=[Pressed.from_value(one) for one in pressed]), 202
+            FleetPressed(commands=[Pressed.from_value(command) for command in pressed]),
+            202,
         )
 
     @routes.post(

@@ -6,7 +6,7 @@ from contextlib import closing
 from datetime import date, timedelta
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, HTTPException, Path, Query, Request, Response
+from fastapi import APIRouter, HTTPException, Query, Request, Response
 from orjson import Fragment
 
 from iveg.adapters.history.lists import (
@@ -15,20 +15,18 @@ from iveg.adapters.history.lists import (
     MOST_ROWS,
     STOPS,
     Filter,
-    ListOf,
-    R,
 )
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.series import (
     AIR,
     EQUIPMENT,
     SPEEDS,
+    Charted,
     people_seen,
     poses_of,
     series_of,
 )
-from iveg.adapters.history.upkeep import lost_of
-from iveg.domain.alerts import MOST_KEPT
+from iveg.adapters.worker import Worker
 from iveg.domain.day import (
     closest_passes,
     encounter_counts,
@@ -39,43 +37,55 @@ from iveg.domain.errors import HopError
 from iveg.domain.fleet import FleetDescription, as_counted
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
+from iveg.domain.retention import DAY_S
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import GreenhouseMap, write_json
 from iveg.models.command import Command
 from iveg.models.history import Day, Encounters, Pass, Slowed, Worked
 from iveg.vital.ports import Clock
-from iveg.web.api.answers import Apart, Json
+from iveg.web.api.answers import Json
 from iveg.web.api.exports import MEDIA_TYPES
-from iveg.web.api.history_filters import HistoryDay, Range, Span, range_of
+from iveg.web.api.history_filters import (
+    USUAL_RANGE_S,
+    HistoryDay,
+    Range,
+    RecordId,
+    Span,
+    range_of,
+)
 from iveg.web.pages import charts
 from iveg.web.pages.drawing import Pages
 from iveg.web.pages.sentences import in_madrid, start_of
-from iveg.web.security.requirements import require
+from iveg.web.security.requirements import READERS, Reader
 
-_DAY_S = 86_400.0
 _FIGURES: dict[str, Any] = {
     "response_class": Response,
     "responses": {200: {"content": {"application/json": {}}}},
 }
-"""Said of each route of figures."""
+"""OpenAPI of each route of figures."""
 
 
 def add_routes(
     routes: APIRouter,
     queries: Queries,
-    worker: Apart,
+    worker: Worker,
     fleet: FleetDescription,
     read_clock: Clock,
 ) -> None:
-    """Add the figures to the routes of the history, whose arguments these are."""
+    """Add the routes of figures; the arguments are those of the history's routes."""
 
     async def figures(
+        span: Span,
+        usual_s: float,
+        rows: Charted,
         draw: Callable[..., Mapping[str, bytes]],
-        since: float,
-        until: float,
         *facts: object,
+        robot: str | None = None,
     ) -> Response:
-        body = await worker.run(_write_figures, draw, since, until, *facts)
+        since, until = range_of(span, read_clock().wall, usual_s)
+        series = await queries.ask(series_of, rows, since, until, robot)
+        # Plotly takes too long for the loop, in which a STOP waits.
+        body = await worker.run(_write_figures, draw, since, until, series, *facts)
         return Response(body, media_type=MEDIA_TYPES["json"])
 
     @routes.get(
@@ -84,10 +94,15 @@ def add_routes(
         description="Speed with the speed limit; the last 15 minutes unless told.",
         **_FIGURES,
     )
-    async def charted(asked: Annotated[Range, Query()]) -> Response:
-        since, until = range_of(asked, read_clock().wall)
-        found = await queries.ask(series_of, SPEEDS, since, until, asked.robot)
-        return await figures(charts.history_figures, since, until, found, fleet)
+    async def charted(span: Annotated[Range, Query()]) -> Response:
+        return await figures(
+            span,
+            USUAL_RANGE_S,
+            SPEEDS,
+            charts.history_figures,
+            fleet,
+            robot=span.robot,
+        )
 
     @routes.get(
         "/api/v1/history/climate",
@@ -96,10 +111,8 @@ def add_routes(
         "time; the last 24 hours unless told.",
         **_FIGURES,
     )
-    async def climate(asked: Annotated[Span, Query()]) -> Response:
-        since, until = range_of(asked, read_clock().wall, _DAY_S)
-        found = await queries.ask(series_of, AIR, since, until)
-        return await figures(charts.climate_figures, since, until, found)
+    async def climate(span: Annotated[Span, Query()]) -> Response:
+        return await figures(span, DAY_S, AIR, charts.climate_figures)
 
     @routes.get(
         "/api/v1/history/equipment",
@@ -108,10 +121,8 @@ def add_routes(
         "attribute; the last 24 hours unless told.",
         **_FIGURES,
     )
-    async def equipment(asked: Annotated[Span, Query()]) -> Response:
-        since, until = range_of(asked, read_clock().wall, _DAY_S)
-        found = await queries.ask(series_of, EQUIPMENT, since, until)
-        return await figures(charts.equipment_figures, since, until, found)
+    async def equipment(span: Annotated[Span, Query()]) -> Response:
+        return await figures(span, DAY_S, EQUIPMENT, charts.equipment_figures)
 
 
 def _write_figures(
@@ -120,12 +131,12 @@ def _write_figures(
     until: float,
     *facts: object,
 ) -> bytes:
-    drawn = draw(*facts)
+    figures = draw(*facts)
     return write_json(
         {
             "since": format_stamp(since),
             "until": format_stamp(until),
-            "figures": {name: Fragment(figure) for name, figure in drawn.items()},
+            "figures": {name: Fragment(figure) for name, figure in figures.items()},
         }
     )
 
@@ -139,55 +150,57 @@ def stop_records_router(
     routes = APIRouter(
         prefix="/api/v1",
         tags=["commands"],
-        dependencies=[Depends(require("read"))],
+        dependencies=READERS,
     )
 
     @routes.get("/commands/{command_id}", response_model=Command)
     async def command(
-        command_id: Annotated[str, Path(pattern=r"^[ -~]{1,64}$")],
+        command_id: RecordId,
     ) -> Response:
-        """One command: as it stands, with what the history knows of it."""
+        """One command in its present state, with its rows of the history."""
         followed = find(command_id, clock())
         try:
-            kept = await _kept(queries, command_id)
+            stored = await _kept(queries, command_id)
         except HopError:
+            # A command of this run is known without the database.
             if followed is None:
                 raise
-            kept = None
-        if followed is None and kept is None:
+            stored = None
+        if followed is None and stored is None:
             raise HTTPException(404, "There is no such command.")
-        return Json(_joined(followed, kept))
+        return Json(_joined(followed, stored))
 
     return routes
 
 
 async def _kept(queries: Queries, command_id: str) -> Command | None:
-    found = await queries.one(COMMANDS, command_id)
-    if found is None:
+    record = await queries.get(COMMANDS, command_id)
+    if record is None:
         return None
     steps = await queries.steps_of([command_id])
-    return Command.from_record(found, steps.get(command_id, ()))
+    return Command.from_record(record, steps.get(command_id, ()))
 
 
 def _joined(followed: Command | None, kept: Command | None) -> Command | None:
-    """Join a command of now with what only the history tells: outcome and steps."""
+    """A followed command with outcome and steps of the history."""
     if followed is None or kept is None:
         return followed or kept
-    ended = {"outcome": kept.outcome, "was_loud": kept.was_loud, "steps": kept.steps}
-    return followed.model_copy(update=ended)
+    outcome = {"outcome": kept.outcome, "was_loud": kept.was_loud, "steps": kept.steps}
+    return followed.model_copy(update=outcome)
 
 
 _DAY = timedelta(days=1)
 _MOST_RECORDS = 20 * MOST_ROWS
-"""So many are read; a day with more is told by those."""
+"""Rows of a list that are read; a longer day is summed up by these."""
 ReadDay = Callable[[date, float], Awaitable[Day]]
-"""Has one day read from the history, as far as it has gone (Unix s)."""
+"""Reads one day from the history, up to a moment (Unix s)."""
 
 
 def read_day(url: str, greenhouse: Greenhouse, day: date, now: float) -> Day:
-    """One day of a history up to ``now`` (Unix s); takes seconds."""
+    """Summary of one day up to ``now`` (Unix s); takes seconds, so it runs apart."""
 
     async def read() -> Day:
+        # The worker is a process of its own and shares no connection.
         with closing(Queries(url)) as queries:
             return await _read(queries, greenhouse, day, now)
 
@@ -196,11 +209,14 @@ def read_day(url: str, greenhouse: Greenhouse, day: date, now: float) -> Day:
 
 async def _read(queries: Queries, greenhouse: Greenhouse, day: date, now: float) -> Day:
     since, end = start_of(day), start_of(day + _DAY)
+    # A future day is empty, and today ends now.
     until = max(since, min(end, now))
     poses = await queries.ask(poses_of, since, until)
-    seen = await queries.ask(people_seen, since, until)
-    decisions = await _newest(queries, DECISIONS, since, until)
-    stops = await _newest(queries, STOPS, since, until)
+    sightings = await queries.ask(people_seen, since, until)
+    span = Filter(since=since, until=until, limit=MOST_ROWS)
+    decisions = await queries.rows(DECISIONS, span, _MOST_RECORDS)
+    stops = await queries.rows(STOPS, span, _MOST_RECORDS)
+    # An open slow-down counts up to the end of the range.
     slowed = slowed_minutes(decisions, greenhouse, until)
     by_name = [
         Worked(lane=lane, robot_id=robot, minutes=robots[robot])
@@ -209,7 +225,7 @@ async def _read(queries: Queries, greenhouse: Greenhouse, day: date, now: float)
     ]
     by_length = [
         Slowed(cause=cause, lane=lane, minutes=minutes)
-        for (cause, lane), minutes in sorted(slowed.items(), key=lambda one: -one[1])
+        for (cause, lane), minutes in sorted(slowed.items(), key=lambda row: -row[1])
     ]
     return Day(
         day=day.isoformat(),
@@ -220,38 +236,23 @@ async def _read(queries: Queries, greenhouse: Greenhouse, day: date, now: float)
         slowed=by_length,
         encounters=Encounters.from_value(encounter_counts(decisions)),
         passes=[
-            Pass.from_value(one) for one in closest_passes(poses, seen, greenhouse)
+            Pass.from_value(passing)
+            for passing in closest_passes(poses, sightings, greenhouse)
         ],
-        stops=[Command.from_record(one) for one in reversed(stops)],
-        unseen=len(await queries.unseen_alerts(MOST_KEPT)),
-        lost=list(await queries.ask(lost_of, since, until)),
-        map=GreenhouseMap.of(greenhouse),
+        stops=[Command.from_record(stop) for stop in reversed(stops)],
+        unseen=len(await queries.unseen_alerts()),
+        map=GreenhouseMap.from_greenhouse(greenhouse),
     )
-
-
-async def _newest(
-    queries: Queries, listed: ListOf[R], since: float, until: float
-) -> list[R]:
-    """The newest rows of a range, newest first."""
-    wanted = Filter(since=since, until=until, limit=MOST_ROWS)
-    pages = queries.pages(listed, await queries.page(listed, wanted), wanted)
-    found: list[R] = []
-    async for page in pages:
-        found += page
-        if len(found) >= _MOST_RECORDS:
-            break
-    return found
 
 
 def router(read: ReadDay, pages: Pages, clock: Clock) -> APIRouter:
     """The evening sheet."""
     routes = APIRouter()
-    who = Depends(require("read"))
 
     @routes.get(
         "/api/v1/day",
         response_model=Day,
-        dependencies=[who],
+        dependencies=READERS,
         tags=["history"],
     )
     async def numbers(
@@ -259,24 +260,24 @@ def router(read: ReadDay, pages: Pages, clock: Clock) -> APIRouter:
             HistoryDay | None, Query(description="Today unless told")
         ] = None,
     ) -> Response:
-        """Summary of one day of the fleet, Europe/Madrid, and what is due next."""
+        """Summary of one day of the fleet, Europe/Madrid, and tasks due next."""
         now = clock().wall
         return Json(await read(day or in_madrid(now).date(), now))
 
     @routes.get("/day", response_model=None, include_in_schema=False)
     async def sheet(
         request: Request,
-        visitor: Annotated[Any, who],
+        visitor: Reader,
         day: Annotated[HistoryDay | None, Query()] = None,
     ) -> Response:
         now = clock().wall
-        wanted = day or in_madrid(now).date()
-        found = await read(wanted, now)
-        before, after = ((wanted + step).isoformat() for step in (-_DAY, _DAY))
+        chosen_day = day or in_madrid(now).date()
+        summary = await read(chosen_day, now)
+        before, after = ((chosen_day + step).isoformat() for step in (-_DAY, _DAY))
         frame = pages.frame(request, "day", visitor)
         # The first drawing also reads the template.
         return await asyncio.to_thread(
-            pages.draw, frame, day=found, before=before, after=after
+            pages.draw, frame, day=summary, before=before, after=after
         )
 
     return routes

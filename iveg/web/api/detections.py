@@ -1,6 +1,6 @@
-"""Detections over HTTP (docs/interfaces/http.md), and what operators say of them.
+"""Detections over HTTP (docs/interfaces/http.md), and operators' answers about them.
 
-They say which detector is in service, what its words stand for, and who is no person.
+An answer takes a detector out of service, gives a word a meaning, or marks a thing.
 """
 
 import asyncio
@@ -12,9 +12,9 @@ from fastapi import APIRouter, Query, Response
 from pydantic import AfterValidator, Field, model_validator
 
 from iveg.adapters.history.lists import USUAL_ROWS
+from iveg.domain.detector import WordAnswer
 from iveg.domain.records import DetectionRecord
 from iveg.domain.wire import legible
-from iveg.domain.words import WordAnswer
 from iveg.models.base import Body, Listing
 from iveg.models.people import DetectionRow, Thing
 from iveg.models.robot import Detector
@@ -28,7 +28,7 @@ from iveg.web.security.requirements import READERS, Operator
 
 
 def router(newest: NewestDetections) -> APIRouter:
-    """Each detection, which the history does not keep; answers are made in a thread."""
+    """The route of every recent detection; the history keeps only some of them."""
     routes = APIRouter(
         prefix="/api/v1",
         tags=["live"],
@@ -39,20 +39,21 @@ def router(newest: NewestDetections) -> APIRouter:
         "/detections/latest",
         response_model=Listing[DetectionRow],
     )
-    async def latest(asked: Annotated[RowFilters, Query()]) -> Response:
-        """Each detection of the last moments, none left out, newest first."""
-        rows = newest.rows(admitting(asked), asked.limit or USUAL_ROWS)
+    async def latest(filters: Annotated[RowFilters, Query()]) -> Response:
+        """All detections of the last moments, newest first."""
+        rows = newest.rows(admitting(filters), filters.limit or USUAL_ROWS)
+        # Up to 1,000 rows: the loop must not wait while they become JSON.
         return await asyncio.to_thread(_listing, rows)
 
     return routes
 
 
 def _listing(records: Sequence[DetectionRecord]) -> Json:
-    return Json(Listing(items=[DetectionRow.from_record(one) for one in records]))
+    return Json(Listing(items=[DetectionRow.from_record(row) for row in records]))
 
 
 class ServiceRequest(Body):
-    """Whether the detector is to be waited for."""
+    """Whether the detector is required."""
 
     in_service: bool
     reason: Annotated[
@@ -82,20 +83,21 @@ class WordRequest(Body):
     )
 
     @model_validator(mode="after")
-    def _asked_twice(self) -> Self:
+    def _is_confirmed(self) -> Self:
+        # A word that is no person makes no zone, so the operator must confirm it.
         if not (self.is_person or self.sure):
             raise ValueError("that it is no person has to be sure")
         return self
 
 
 class MarkRequest(Body):
-    """Which track is no person."""
+    """Track that is no person."""
 
     person_id: Name
 
 
 def words_router(detectors: Detectors, marks: ThingMarks, clock: Clock) -> APIRouter:
-    """Words of operators on detectors, on what they say, and on whom they see."""
+    """Routes of operators: detectors in service, meanings of words, marks."""
     routes = APIRouter(prefix="/api/v1")
 
     @routes.put(
@@ -112,7 +114,7 @@ def words_router(detectors: Detectors, marks: ThingMarks, clock: Clock) -> APIRo
 
         Taking it out needs a ``reason``.
 
-        While it is out of service nobody waits for its pictures.
+        While it is out of service its frames are not required.
         """
         now = clock()
         robot = await detectors.set_in_service(
@@ -122,14 +124,14 @@ def words_router(detectors: Detectors, marks: ThingMarks, clock: Clock) -> APIRo
             in_service=body.in_service,
             reason=body.reason,
         )
-        return Json(Detector.of(robot, now))
+        return Json(Detector.from_robot(robot, now))
 
     @routes.put("/words", status_code=204, tags=["people"])
     async def answer(body: WordRequest, who: Operator) -> Response:
-        """Say whether a word that was asked for stands for a person."""
+        """Answer whether an unknown word stands for a person."""
         now = clock()
-        said = WordAnswer(body.detector, body.word, body.is_person, who.name, now.wall)
-        await detectors.answer(said, now)
+        word = WordAnswer(body.detector, body.word, body.is_person, who.name, now.wall)
+        await detectors.answer(word, now)
         return Response(status_code=204)
 
     @routes.get(
@@ -137,7 +139,7 @@ def words_router(detectors: Detectors, marks: ThingMarks, clock: Clock) -> APIRo
     )
     async def things() -> Response:
         """Every place that an operator marked."""
-        return Json(Listing(items=[Thing.from_value(one) for one in marks.known]))
+        return Json(Listing(items=[Thing.from_value(thing) for thing in marks.known]))
 
     @routes.post(
         "/things",
@@ -146,18 +148,19 @@ def words_router(detectors: Detectors, marks: ThingMarks, clock: Clock) -> APIRo
         tags=["people"],
     )
     async def mark(body: MarkRequest, who: Operator) -> Response:
-        """Mark where a track is, until the day's end.
+        """Mark the place of a track, until the day's end.
 
-        409 for whoever came from elsewhere, moved or was surely seen.
+        409 for a track that came from elsewhere, moved or was surely seen.
         """
         now = clock()
+        # Its cost is a person who stands still inside, so no mark outlives its day.
         until = start_of(in_madrid(now.wall).date() + timedelta(days=1))
         thing = marks.mark(body.person_id, who.name, until, now)
         return Json(Thing.from_value(thing), 201)
 
     @routes.delete("/things/{thing_id}", response_model=Thing, tags=["people"])
     async def unmark(thing_id: str, who: Operator) -> Response:
-        """Take a mark back: from now on whoever is there is somebody."""
+        """Take a mark back: tracks there have zones from now on."""
         return Json(Thing.from_value(marks.unmark(thing_id, who.name, clock())))
 
     return routes

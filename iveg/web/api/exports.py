@@ -6,7 +6,7 @@ never held in memory.
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Literal, TypeVar
 
 from starlette.datastructures import Headers
@@ -26,7 +26,7 @@ R = TypeVar("R", bound=Record)
 
 
 def form_of(headers: Headers) -> Form:
-    """The form that the ``Accept`` header names first; JSON without one."""
+    """Form that the ``Accept`` header names first; JSON if it names none."""
     accepted = headers.get("accept", "").lower()
     named = [
         (accepted.index(media_type), form)
@@ -36,15 +36,20 @@ def form_of(headers: Headers) -> Form:
     return min(named)[1] if named else "json"
 
 
-def csv_head(kind: type[R]) -> bytes:
-    """The first line of rows as CSV (RFC 4180), one column a field of the record."""
-    return _csv_lines([[one.name for one in SHOWN_COLUMNS[kind]]])
+def csv_lines(kind: type[R], records: Iterable[R], *, has_head: bool) -> bytes:
+    """Rows as CSV (RFC 4180), one column a field of the record, times in UTC.
 
-
-def csv_rows(kind: type[R], records: Iterable[R]) -> bytes:
-    """Rows below that line, times in UTC."""
-    columns = SHOWN_COLUMNS[kind]
-    return _csv_lines([_cell_of(one, row) for one in columns] for row in records)
+    Args:
+        kind: Class of the records.
+        records: Records, a row each.
+        has_head: Whether a line with the names of the columns comes first.
+    """
+    columns, text = SHOWN_COLUMNS[kind], io.StringIO()
+    lines = csv.writer(text)
+    if has_head:
+        lines.writerow([column.name for column in columns])
+    lines.writerows([_cell_of(column, row) for column in columns] for row in records)
+    return text.getvalue().encode()
 
 
 def _cell_of(column: Column, record: Record) -> str:
@@ -61,23 +66,15 @@ def ndjson_rows(
     return b"".join(write_json(model(*row)) + b"\n" for row in rows)
 
 
-def _csv_lines(rows: Iterable[Sequence[str]]) -> bytes:
-    text = io.StringIO()
-    csv.writer(text).writerows(rows)
-    return text.getvalue().encode()
-
-
 def cell(value: object) -> str:
     """A value as a cell; empty for None."""
     if value is None:
         return ""
+    # As in JSON, not as Python writes them.
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, Mapping | list):
         return write_json(value).decode()
-    return _safe(value) if isinstance(value, str) else str(value)
-
-
-def _safe(text: str) -> str:
-    """A cell that no spreadsheet runs as a formula; our numbers stay numbers."""
-    return "'" + text if text.startswith(_FORMULA) else text
+    # No spreadsheet runs a text as a formula; our numbers stay numbers.
+    is_formula = isinstance(value, str) and value.startswith(_FORMULA)
+    return f"'{value}" if is_formula else str(value)

@@ -1,4 +1,4 @@
-"""Goals of robots (docs/interfaces/http.md): below STOP, and nothing in its way."""
+"""Goals of robots (docs/interfaces/http.md), which never delay a STOP."""
 
 from typing import Annotated, Literal
 
@@ -12,6 +12,7 @@ from iveg.vital.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.security.requirements import Operator
 
+# Beyond any map: the place is checked for the robot later (409).
 _Metres = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
@@ -35,7 +36,7 @@ class AisleRequest(_Wish):
 
 
 class PlainRequest(_Wish):
-    """Back to where the robot belongs, or stay where it is."""
+    """Return to the robot's start, or stay at its place."""
 
     kind: Literal["return", "pause"]
 
@@ -53,7 +54,7 @@ def router(goals: GoalDispatcher, clock: Clock) -> APIRouter:
     async def give(robot_id: str, body: GoalRequest, who: Operator) -> Response:
         """Send a robot somewhere; 409 while it is held or the place is not free."""
         return Json(
-            Goal.of(
+            Goal.from_goal(
                 goals.give(robot_id, GoalWish(**body.model_dump()), who.name, clock())
             ),
             202,
@@ -61,7 +62,7 @@ def router(goals: GoalDispatcher, clock: Clock) -> APIRouter:
 
     @routes.delete("/robots/{robot_id}/goal", status_code=202, response_model=Goal)
     async def cancel(robot_id: str, who: Operator) -> Response:
-        """Have a robot forget its goal and stay where it is; 409 without one."""
-        return Json(Goal.of(goals.cancel(robot_id, who.name, clock())), 202)
+        """Have a robot forget its goal and stay; 409 without a goal."""
+        return Json(Goal.from_goal(goals.cancel(robot_id, who.name, clock())), 202)
 
     return routes

@@ -39,26 +39,27 @@ class Queues:
 
 
 class _Computed(Collector):
-    """Families that were computed for one request."""
+    """Families that were computed for a single request."""
 
     def __init__(self, families: list[Metric]) -> None:
         self._families = families
 
     def collect(self) -> Iterable[Metric]:
-        """All of them."""
+        """All families."""
         return self._families
 
 
 def _family(
     type_: str, name: str, text: str, label: str, samples: Mapping[str, float | None]
 ) -> Metric:
-    """One family; samples that nobody knows are left out."""
-    made = Metric(f"iveg_{name}", text, type_)
+    """One family of metrics; unknown values are left out."""
+    metric = Metric(f"iveg_{name}", text, type_)
     sample = f"iveg_{name}_total" if type_ == "counter" else f"iveg_{name}"
     for key, value in samples.items():
+        # A zero for an unknown lag or clock would look healthy.
         if value is not None:
-            made.add_sample(sample, {label: key} if label else {}, value)
-    return made
+            metric.add_sample(sample, {label: key} if label else {}, value)
+    return metric
 
 
 def _families(health: Health, watch: LatencyWatch, queues: Queues) -> list[Metric]:
@@ -105,16 +106,16 @@ def _summary(latency: _Latency) -> Metric:
     """Quantiles, sum and count of each hop."""
     name = "iveg_latency_seconds"
     text = "Latency of a hop; quantiles are of the last 15 minutes."
-    made = Metric(name, text, "summary")
+    metric = Metric(name, text, "summary")
     for (robot, data, hop), count, total, sketches in latency:
         labels, sketch = {"robot": robot, "data": data, "hop": hop}, merged(sketches)
         for share in _SHARES:
             value = sketch.quantile(share)
             if value is not None:
-                made.add_sample(name, {**labels, "quantile": f"{share:g}"}, value)
-        made.add_sample(f"{name}_sum", labels, total)
-        made.add_sample(f"{name}_count", labels, count)
-    return made
+                metric.add_sample(name, {**labels, "quantile": f"{share:g}"}, value)
+        metric.add_sample(f"{name}_sum", labels, total)
+        metric.add_sample(f"{name}_count", labels, count)
+    return metric
 
 
 _READY: dict[int | str, dict[str, Any]] = {503: {"description": "A hop is not well."}}
@@ -127,7 +128,7 @@ def router(
     watch: LatencyWatch,
     queues: Callable[[], Queues],
 ) -> APIRouter:
-    """The endpoints that machines ask."""
+    """Routes for supervisors and Prometheus."""
     routes = APIRouter(tags=["health"])
 
     @routes.get(
@@ -136,15 +137,16 @@ def router(
         response_class=PlainTextResponse,
     )
     async def alive() -> Response:
-        """The process answers; says nothing else to strangers."""
+        """Liveness: the process answers, and shows strangers nothing else."""
         return PlainTextResponse("ok\n")
 
     @routes.get("/readyz", dependencies=READERS, responses=_READY)
     async def ready() -> Response:
         """200 when every hop and the file of accounts are well, else 503."""
-        kept = accounts()
-        is_ok = health(clock()).ok and kept == "ok"
-        return Json({"ok": is_ok, "accounts": kept}, 200 if is_ok else 503)
+        # A damaged file of accounts may lock people out while every hop works.
+        accounts_state = accounts()
+        is_ok = health(clock()).ok and accounts_state == "ok"
+        return Json({"ok": is_ok, "accounts": accounts_state}, 200 if is_ok else 503)
 
     @routes.get(
         "/metrics",
@@ -153,8 +155,7 @@ def router(
     )
     async def metrics() -> Response:
         """Counters, hops, latency and safety in Prometheus' text format."""
-        now = clock()
-        families = _families(health(now), watch, queues())
+        families = _families(health(clock()), watch, queues())
         latency: _Latency = [
             (
                 (stream.robot_id, stream.data, hop),
@@ -162,7 +163,7 @@ def router(
                 part.total,
                 part.parts(),
             )
-            for stream in watch.streams
+            for stream in watch.streams.values()
             for hop, part in stream.segments.items()
             if part.count
         ]

@@ -8,13 +8,14 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Generic, TypeVar
 
-from fastapi import APIRouter, Depends, HTTPException, Path, Query, Request, Response
+from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
 from iveg.adapters import clock
 from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Cursor, ListOf, Page
 from iveg.adapters.history.queries import Queries
+from iveg.adapters.worker import Worker
 from iveg.domain.errors import HopError
 from iveg.domain.fleet import NOBODY, FleetDescription
 from iveg.domain.records import CommandRecord, DecisionRecord, Record
@@ -32,10 +33,10 @@ from iveg.models.history import (
 from iveg.models.people import DetectionRow
 from iveg.vital.ports import Clock
 from iveg.web.api import day, exports
-from iveg.web.api.answers import Apart, Json
+from iveg.web.api.answers import Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
-from iveg.web.api.history_filters import Filters, filter_of
-from iveg.web.security.requirements import require
+from iveg.web.api.history_filters import Filters, RecordId, filter_of
+from iveg.web.security.requirements import READERS, require
 from iveg.web.security.roles import Action
 
 R = TypeVar("R", bound=Record)
@@ -48,7 +49,7 @@ class HistoryList(Generic[R]):
 
     Attributes:
         shape: Model of a row.
-        beside: Other rows that the models of some rows need, in their order.
+        beside: Reads further data for the model of each record, in their order.
         needs: Right that a reader must have.
         present: Alerts of now, which lead their list and need no database.
     """
@@ -64,7 +65,7 @@ class HistoryList(Generic[R]):
     async def rows(self, records: Sequence[R]) -> list[tuple[Any, ...]]:
         """Arguments of ``shape.from_record``, for each record."""
         if self.beside is None:
-            return [(one,) for one in records]
+            return [(record,) for record in records]
         return list(zip(records, await self.beside(records), strict=True))
 
 
@@ -74,8 +75,9 @@ def lists_of(
     """All lists of the history."""
 
     async def steps_of(records: Sequence[CommandRecord]) -> list[Any]:
-        steps = await queries.steps_of([one.command_id for one in records])
-        return [steps.get(one.command_id, ()) for one in records]
+        # All steps of a page in one query, not one query for each command.
+        steps = await queries.steps_of([command.command_id for command in records])
+        return [steps.get(command.command_id, ()) for command in records]
 
     return (
         HistoryList(
@@ -141,9 +143,9 @@ def lists_of(
 
 def router(
     queries: Queries,
-    worker: Apart,
+    worker: Worker,
     *,
-    present: Callable[[str], DecisionRecord | None] = lambda _: None,
+    present: Callable[[str], DecisionRecord | None],
     alerts: Callable[[], list[Alert]] = list,
     fleet: FleetDescription = NOBODY,
     read_clock: Clock = clock.now,
@@ -153,17 +155,17 @@ def router(
     Args:
         queries: Reading side of the history.
         worker: Writes files and draws figures.
-        present: A decision that is still in memory; its links are those of now.
-        alerts: Those of now.
+        present: Finds a decision in memory, whose links are those of now.
+        alerts: Alerts of now.
         fleet: Robots, whose greatest speeds a chart shows.
-        read_clock: What "the last 15 minutes" end at.
+        read_clock: Gives the end of "the last 15 minutes".
     """
     routes = APIRouter(
-        dependencies=[Depends(require("read"))],
+        dependencies=READERS,
         tags=["history"],
     )
-    for one in lists_of(queries, alerts):
-        _add_list(routes, queries, one, worker)
+    for listed in lists_of(queries, alerts):
+        _add_list(routes, queries, listed, worker)
 
     @routes.get(
         "/api/v1/decisions/{decision_id}",
@@ -171,53 +173,58 @@ def router(
         response_model=Decision,
     )
     async def decision(
-        decision_id: Annotated[str, Path(pattern=r"^[ -~]{1,64}$")],
+        decision_id: RecordId,
     ) -> Response:
-        found = present(decision_id) or await queries.one(lists.DECISIONS, decision_id)
-        if found is None:
+        # Memory first: the history has an open decision without its last links.
+        record = present(decision_id) or await queries.get(lists.DECISIONS, decision_id)
+        if record is None:
             raise HTTPException(404, "There is no such decision.")
-        return Json(Decision.from_record(found))
+        return Json(Decision.from_record(record))
 
     day.add_routes(routes, queries, worker, fleet, read_clock)
     return routes
 
 
 def _add_list(
-    routes: APIRouter, queries: Queries, one: HistoryList[R], worker: Apart
+    routes: APIRouter, queries: Queries, listed: HistoryList[R], worker: Worker
 ) -> None:
     @routes.get(
-        f"/api/v1/{one.path}",
-        name=one.path,
-        summary=one.says,
-        response_model=Listing[one.shape],  # type: ignore[name-defined]
+        f"/api/v1/{listed.path}",
+        name=listed.path,
+        summary=listed.says,
+        response_model=Listing[listed.shape],  # type: ignore[name-defined]
         responses={200: {"content": _FILES}},
-        dependencies=[Depends(require(one.needs))],
+        dependencies=[Depends(require(listed.needs))],
     )
     async def listing(
         request: Request, filters: Annotated[Filters, Query()]
     ) -> Response:
         form = filters.format or exports.form_of(request.headers)
-        wanted = filter_of(filters, one.source)
+        database_filter = filter_of(filters, listed.source)
+        # A file without a limit holds every row, so it reads the largest pages.
         if form != "json" and filters.limit is None:
-            wanted = replace(wanted, limit=lists.MOST_ROWS)
-        # The first page is read before the answer begins, so that a refusal is told.
+            database_filter = replace(database_filter, limit=lists.MOST_ROWS)
+        # The first page is read before the answer begins: later no status can refuse.
+        # Alerts of now pass through no filter, so they lead the plain first page alone.
         is_plain = form == "json" and filters.model_fields_set <= {"limit", "format"}
-        now = one.present() if is_plain else []
+        now = listed.present() if is_plain else []
         try:
-            page = await queries.page(one.source, wanted)
+            page = await queries.page(listed.source, database_filter)
         except HopError:
+            # Alerts of now are shown even while the database is away.
             if not now:
                 raise
             page = Page((), None)
         if form == "json":
-            rows = await one.rows(page.items)
-            model = one.shape.from_record
+            rows = await listed.rows(page.items)
+            model = listed.shape.from_record
             return await asyncio.to_thread(_listing, model, rows, page.next, now)
+        # With a limit the file ends after its first page.
         if filters.limit is not None:
             page = replace(page, next=None)
-        pages = queries.pages(one.source, page, wanted)
-        body = file_parts(one, pages, form, worker.run)
-        attached = f'attachment; filename="{one.path}.{form}"'
+        pages = queries.pages(listed.source, page, database_filter)
+        body = file_parts(listed, pages, form, worker.run)
+        attached = f'attachment; filename="{listed.path}.{form}"'
         return StreamingResponse(
             body, 200, {"Content-Disposition": attached}, MEDIA_TYPES[form]
         )
@@ -237,30 +244,26 @@ def _listing(
 ) -> Json:
     items: list[Any] = [model(*row) for row in rows]
     if now:
-        known = {one.alert_id for one in now}
-        items = [*now, *(one for one in items if one.alert_id not in known)]
+        # An alert of now is in the history, too, in an older state.
+        known = {alert.alert_id for alert in now}
+        items = [*now, *(row for row in items if row.alert_id not in known)]
     after = None if cursor is None else lists.write_cursor(cursor)
     return Json({"items": items, "next": after})
 
 
 async def file_parts(
-    one: HistoryList[R],
+    listed: HistoryList[R],
     pages: AsyncIterator[Sequence[R]],
     form: Form,
     run: Callable[..., Awaitable[bytes]],
 ) -> AsyncIterator[bytes]:
-    """A list as a file, a part for each page; ``run`` has a part written elsewhere."""
+    """A list as a file, a part for each page, which ``run`` writes outside the loop."""
     has_head = form == "csv"
     async for records in pages:
         if form == "csv":
-            kind = one.source.kind
-            yield await run(_csv_page, kind, records, has_head=has_head)
+            kind = listed.source.kind
+            yield await run(exports.csv_lines, kind, records, has_head=has_head)
             has_head = False
         else:
-            rows = await one.rows(records)
-            yield await run(exports.ndjson_rows, one.shape.from_record, rows)
-
-
-def _csv_page(kind: type[R], records: Sequence[R], *, has_head: bool) -> bytes:
-    head = exports.csv_head(kind) if has_head else b""
-    return head + exports.csv_rows(kind, records)
+            rows = await listed.rows(records)
+            yield await run(exports.ndjson_rows, listed.shape.from_record, rows)

@@ -1,7 +1,7 @@
-"""Questions about the past, read and checked at the boundary.
+"""Parameters of requests to the history, read and checked at the boundary.
 
 Times are ISO-8601; one without an offset is UTC.  A name that is not a filter is
-refused: a misspelt filter that answers everything would mislead.
+refused: an ignored misspelt filter would mislead.
 """
 
 from collections.abc import Callable
@@ -29,15 +29,15 @@ from iveg.web.api.exports import Form
 R = TypeVar("R", bound=Record)
 LONGEST_RANGE_S = 31 * 86_400.0
 _FIRST_DAY, _LAST_DAY = date(1970, 1, 2), date(9000, 1, 1)
-"""Days with which time zones and ranges can be computed."""
-_USUAL_RANGE_S = 15 * 60.0
+"""Days for which every time zone and range can be computed without overflow."""
+USUAL_RANGE_S = 15 * 60.0
 _ROBOT_ID = r"^[A-Za-z0-9-]{1,64}$"
 _NO_CONTROLS = r"^[^\x00-\x1f]*$"
 """PostgreSQL refuses text that holds NUL."""
 
 
 def mend_plus(value: object) -> object:
-    """A moment's text, with the plus that an address makes a space."""
+    """A moment's text, with the plus sign that an address turned into a space."""
     # An unescaped "+00:00" reaches us as " 00:00", from nearly every first attempt.
     if isinstance(value, str) and "T" in value:
         return value.strip().replace(" ", "+")
@@ -57,6 +57,7 @@ def as_kept(day: date) -> date:
     return day
 
 
+RecordId = Annotated[str, Field(pattern=r"^[ -~]{1,64}$")]
 Moment = Annotated[datetime, BeforeValidator(mend_plus), AfterValidator(_in_utc)]
 HistoryDay = Annotated[date, AfterValidator(as_kept)]
 
@@ -71,13 +72,14 @@ class Span(BaseModel):
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
+        # An empty answer would hide that start and end were swapped.
         if self.since and self.until and self.since > self.until:
             raise PydanticCustomError("order", "since is after until")
         return self
 
 
 class Range(Span):
-    """Since when, until when, and of which robot."""
+    """Start, end and robot of a range."""
 
     robot: str | None = Field(None, pattern=_ROBOT_ID, description="Robot id")
 
@@ -116,7 +118,7 @@ class Filters(RowFilters):
 
 
 def admitting(wanted: RowFilters) -> Callable[[JudgedDetection], bool]:
-    """Whether a detection that is in memory is one of those that are asked for."""
+    """A filter for detections in memory: whether a request asks for one."""
     since = seconds(wanted.since) or float("-inf")
     until = seconds(wanted.until) or float("inf")
 
@@ -135,10 +137,10 @@ def admitting(wanted: RowFilters) -> Callable[[JudgedDetection], bool]:
 
 
 def filter_of(filters: Filters, listed: ListOf[R]) -> Filter:
-    """The question to the database.
+    """The database's filter for a request.
 
     Raises:
-        RequestValidationError: the cursor is none of such a list.
+        RequestValidationError: the cursor belongs to another list.
     """
     try:
         text = filters.cursor
@@ -157,16 +159,14 @@ def filter_of(filters: Filters, listed: ListOf[R]) -> Filter:
     )
 
 
-def range_of(
-    asked: Span, now: float, usual_s: float = _USUAL_RANGE_S
-) -> tuple[float, float]:
-    """Since and until in Unix seconds; the last ``usual_s`` when nothing is asked.
+def range_of(span: Span, now: float, usual_s: float) -> tuple[float, float]:
+    """Since and until (Unix s); by default the last ``usual_s`` up to now.
 
     Raises:
         RequestValidationError: the range is turned round or too long to draw.
     """
-    until = now if asked.until is None else asked.until.timestamp()
-    since = until - usual_s if asked.since is None else asked.since.timestamp()
+    until = now if span.until is None else span.until.timestamp()
+    since = until - usual_s if span.since is None else span.since.timestamp()
     if since > until:
         raise _invalid("since", "since is after until")
     if until - since > LONGEST_RANGE_S:
@@ -175,7 +175,7 @@ def range_of(
 
 
 def seconds(moment: datetime | None) -> float | None:
-    """Unix time (s); None where none was asked for."""
+    """Unix time (s); None without a moment."""
     return None if moment is None else moment.timestamp()
 
 

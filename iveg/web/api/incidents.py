@@ -1,4 +1,4 @@
-"""Incident packs over HTTP: all that is known of some minutes, as one ZIP.
+"""Incident packs over HTTP: all data about some minutes, as one ZIP.
 
 A page, the recording, the rows of the history, every version of the rule and the
 settings without secrets (docs/interfaces/recordings.md, "Incident packs").
@@ -10,22 +10,19 @@ import tempfile
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
 import orjson
 from fastapi import APIRouter, HTTPException, Query, Request
 from fastapi.responses import FileResponse
-from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
-from pydantic import Field
 from starlette.background import BackgroundTask
 
 from iveg.adapters.history import lists
-from iveg.adapters.history.lists import MOST_ROWS, Filter, ListOf, R
+from iveg.adapters.history.lists import MOST_ROWS, Filter, ListOf
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.recordings.recorder import InputRecorder
+from iveg.adapters.worker import Worker
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
@@ -41,40 +38,39 @@ from iveg.domain.stamps import format_stamp
 from iveg.models.history import sentence_of
 from iveg.models.rule import Rule
 from iveg.vital.ports import Clock
-from iveg.web.api.answers import Apart
-from iveg.web.api.history_filters import Span
-from iveg.web.pages.drawing import appearance_of
+from iveg.web.api.history_filters import RecordId, Span
+from iveg.web.pages.drawing import appearance_of, environment_of
 from iveg.web.pages.sentences import Sentences, in_madrid, local_stamp, read_sentences
 from iveg.web.security.requirements import Operator
 
 MEDIA_TYPE = "application/zip"
 LONGEST_S, BEFORE_S, AFTER_S = 3600.0, 30.0, 30.0
 _About = tuple[str, float, float, str]
-"""Language of the page, since, until (Unix s), and what the pack is about."""
+"""Language of the page, since, until (Unix s), and subject of the pack."""
 
 
 class About(Span):
-    """Subject of a pack: a range, or one of the rest with its surroundings."""
+    """Subject of a pack: a range, or a record with the minutes around it."""
 
-    decision: str | None = Field(None, pattern=r"^[ -~]{1,64}$")
-    command: str | None = Field(None, pattern=r"^[ -~]{1,64}$")
-    alert: str | None = Field(None, pattern=r"^[ -~]{1,64}$")
+    decision: RecordId | None = None
+    command: RecordId | None = None
+    alert: RecordId | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Sources:
-    """Where the parts of a pack come from.
+    """Sources of the parts of a pack.
 
     Attributes:
         rules: Every version of the rule, oldest first.
-        settings: Those that hold no secret, by variable.
-        log: Takes a line of the log.
-        version: Of iVeg.
+        settings: Settings without secrets, by variable.
+        log: Writes a line into the log.
+        version: Version of iVeg.
     """
 
     queries: Queries
     recordings: InputRecorder
-    worker: Apart
+    worker: Worker
     rules: Callable[[], Sequence[DetectionRule]]
     settings: Mapping[str, str]
     log: Callable[[LogEvent, Instant], None]
@@ -97,21 +93,22 @@ def router(sources: Sources) -> APIRouter:
         request: Request,
     ) -> FileResponse:
         """Everything about some minutes as a ZIP, at most an hour."""
-        since, until, said = await _range(subject, sources)
+        since, until, title = await _range(subject, sources)
         now = sources.clock().wall
         if since > now:
             raise HTTPException(422, "That range is still to come.")
-        # What is still to come is in no pack, so its end does not claim it.
+        # The pack's end must not claim minutes that are still to come.
         until = min(until, now)
         folder = Path(await asyncio.to_thread(tempfile.mkdtemp, prefix="iveg-pack-"))
         clear = BackgroundTask(shutil.rmtree, folder, ignore_errors=True)
         try:
             language = appearance_of(request).language
-            await _pack(sources, folder, (language, since, until, said))
+            await _pack(sources, folder, (language, since, until, title))
+        # Also after a cancelled request: the folder holds people's places.
         except BaseException:
             shutil.rmtree(folder, ignore_errors=True)
             raise
-        slots = {"by": principal.name, "about": said}
+        slots = {"by": principal.name, "about": title}
         sources.log(LogEvent("system", "log.incident_packed", slots), sources.clock())
         name = f"incident-{format_stamp(since)[:19].replace(':', '-')}Z.zip"
         return FileResponse(
@@ -122,22 +119,23 @@ def router(sources: Sources) -> APIRouter:
 
 
 async def _range(subject: About, sources: Sources) -> tuple[float, float, str]:
-    """Since, until (Unix s), and what it is about."""
+    """Since, until (Unix s), and subject of a pack."""
     rows: dict[str, tuple[ListOf[Any], str]] = {
         "decision": (lists.DECISIONS, "ended_at"),
         "command": (lists.COMMANDS, "standing_at"),
         "alert": (lists.ALERTS, "cleared_at"),
     }
     for kind, (table, ends) in rows.items():
-        wanted = getattr(subject, kind)
-        if wanted is None:
+        identifier = getattr(subject, kind)
+        if identifier is None:
             continue
-        found = await sources.queries.one(table, wanted)
-        if found is None:
+        record = await sources.queries.get(table, identifier)
+        if record is None:
             raise HTTPException(404, f"There is no such {kind}.")
-        began = getattr(found, table.at.name)
-        since, ended = began - BEFORE_S, getattr(found, ends) or began
-        return since, min(ended + AFTER_S, since + LONGEST_S), f"{kind} {wanted}"
+        began = getattr(record, table.at.name)
+        # A record that goes on has no end yet: its begin counts.
+        since, ended = began - BEFORE_S, getattr(record, ends) or began
+        return since, min(ended + AFTER_S, since + LONGEST_S), f"{kind} {identifier}"
     if subject.since is None or subject.until is None:
         raise HTTPException(
             422, "Name a decision, a command, an alert, or since and until."
@@ -150,16 +148,18 @@ async def _range(subject: About, sources: Sources) -> tuple[float, float, str]:
 
 async def _pack(sources: Sources, folder: Path, about: _About) -> None:
     """Write ``pack.zip``."""
-    _, since, until, said = about
+    _, since, until, title = about
     messages = await sources.recordings.excerpt(folder / "recording.mcap", since, until)
     facts = {
         "iveg": sources.version,
         "made_at": format_stamp(sources.clock().wall),
-        "about": said,
+        "about": title,
         "since": format_stamp(since),
         "until": format_stamp(until),
         "messages": messages,
-        "rules": [Rule.of(rule).model_dump(mode="json") for rule in sources.rules()],
+        "rules": [
+            Rule.from_rule(rule).model_dump(mode="json") for rule in sources.rules()
+        ],
         "settings": dict(sources.settings),
     }
     rows = await _rows(sources.queries, since, until)
@@ -179,11 +179,15 @@ async def _rows(
         "odometry": lists.ODOMETRY,
     }
     span = Filter(since=since, until=until, limit=MOST_ROWS)
-    found = {name: await _all(queries, rows, span) for name, rows in parts.items()}
-    # A note is about a moment, whenever it was written after it.
-    later = await _all(queries, lists.NOTES, Filter(since=since, limit=MOST_ROWS))
-    found["notes"] = [note for note in later if since <= _moment_of(note) < until]
-    return found
+    by_list = {
+        name: (await queries.rows(rows, span))[::-1] for name, rows in parts.items()
+    }
+    # A note is about a moment before it was written.
+    later = await queries.rows(lists.NOTES, Filter(since=since, limit=MOST_ROWS))
+    by_list["notes"] = [
+        note for note in reversed(later) if since <= _moment_of(note) < until
+    ]
+    return by_list
 
 
 def _is_note(row: Record) -> bool:
@@ -191,14 +195,8 @@ def _is_note(row: Record) -> bool:
 
 
 def _moment_of(line: LogRecord) -> float:
-    """The moment that a line of the log is about (Unix s)."""
+    """Moment that a line of the log describes (Unix s)."""
     return float(line.slots.get("pinned_at", line.at))
-
-
-async def _all(queries: Queries, rows: ListOf[R], span: Filter) -> list[R]:
-    """A whole list, oldest first."""
-    pages = queries.pages(rows, await queries.page(rows, span), span)
-    return [row async for page in pages for row in page][::-1]
 
 
 def _write(
@@ -207,20 +205,20 @@ def _write(
     facts: Mapping[str, object],
     rows: Mapping[str, Sequence[Record]],
 ) -> None:
-    """The pack, where nothing waits for it."""
-    language, since, until, said = about
-    # A note stands at the moment that it is about, and once.
+    """Write the pack, in the worker's process."""
+    language, since, until, title = about
+    # A note stands once, at the moment that it describes.
     log = [row for row in rows["log"] if not _is_note(row)]
     names = ("decisions", "commands", "alerts", "notes")
     events = [*log, *(row for name in names for row in rows[name])]
     try:
         with zipfile.ZipFile(folder / "pack.zip", "w", zipfile.ZIP_DEFLATED) as pack:
             pack.writestr(
-                "report.html", write_report(language, since, until, events, said)
+                "report.html", write_report(language, since, until, events, title)
             )
             pack.writestr("about.json", orjson.dumps(facts, option=orjson.OPT_INDENT_2))
-            for name, found in rows.items():
-                lines = (orjson.dumps(asdict(row)) + b"\n" for row in found)
+            for name, records in rows.items():
+                lines = (orjson.dumps(asdict(row)) + b"\n" for row in records)
                 pack.writestr(f"rows/{name}.ndjson", b"".join(lines))
             pack.write(folder / "recording.mcap", "recording.mcap")
     except OSError as error:
@@ -229,7 +227,7 @@ def _write(
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One event: when (Unix s), which kind of row, whose, and what."""
+    """One line of the report: moment (Unix s), kind of row, robot, sentence."""
 
     at: float
     kind: str
@@ -243,24 +241,24 @@ class Line:
 
 
 def write_report(
-    language: str, since: float, until: float, rows: Sequence[Record], said: str
+    language: str, since: float, until: float, rows: Sequence[Record], title: str
 ) -> bytes:
     """HTML of all events between two moments (Unix s).
 
-    ``rows`` are decisions, commands, alerts and log; ``said`` is what the pack
-    is about, as its manifest has it.
+    ``rows`` are decisions, commands, alerts and log; ``title`` is the subject of the
+    pack, as in its manifest.
     """
     sentences = read_sentences(language)
     lines = sorted(_lines(rows, sentences), key=lambda line: line.at)
-    html = _template().render(
+    template = environment_of(sentences).get_template("incident.html")
+    html = template.render(
         language=language,
-        say=lambda key, **slots: sentences.say(key, slots),
         since=format_stamp(since),
         until=format_stamp(until),
         local_since=local_stamp(since),
         local_until=local_stamp(until),
         day=f"{in_madrid(since):%Y-%m-%d}",
-        about=said,
+        about=title,
         lines=lines,
     )
     return html.encode()
@@ -284,12 +282,3 @@ def _lines(rows: Iterable[Record], sentences: Sentences) -> Iterator[Line]:
                 kind = sentences.say(f"history.kind.{row.kind}", {})
                 text = f"{kind} · {row.state} · {row.requested_by}"
                 yield Line(row.requested_at, "command", row.robot_id, text)
-
-
-@cache
-def _template() -> Template:
-    folder = str(files("iveg") / "templates")
-    environment = Environment(
-        loader=FileSystemLoader(folder), autoescape=True, undefined=StrictUndefined
-    )
-    return environment.get_template("incident.html")

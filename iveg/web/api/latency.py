@@ -11,7 +11,7 @@ import orjson
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from iveg.domain.clock_offset import ClockOffset
+from iveg.adapters.worker import Worker
 from iveg.domain.latency import (
     DATA,
     PAPER,
@@ -30,13 +30,13 @@ from iveg.models.health import (
     in_ms,
 )
 from iveg.vital.ports import Clock
-from iveg.web.api.answers import Apart, Json
+from iveg.web.api.answers import Json
 from iveg.web.pages.charts import cdf_figure
 from iveg.web.security.requirements import READERS
 
 
-class Asked(BaseModel):
-    """Robot of the question."""
+class LatencyQuery(BaseModel):
+    """Parameters of a request for the table."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -56,16 +56,7 @@ def _spread(sketch: Sketch) -> SegmentSpread:
     )
 
 
-def _clock(robot_id: str, offset: ClockOffset) -> LatencyClock:
-    return LatencyClock(
-        robot_id=robot_id,
-        state=offset.state,
-        offset_ms=in_ms(offset.offset_s),
-        uncertainty_ms=in_ms(offset.uncertainty_s),
-    )
-
-
-def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
+def router(watch: LatencyWatch, clock: Clock, worker: Worker) -> APIRouter:
     """Routes of the latency table."""
     routes = APIRouter(
         prefix="/api/v1",
@@ -74,19 +65,20 @@ def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
     )
 
     @routes.get("/latency", response_model=LatencyTable)
-    async def latency(asked: Annotated[Asked, Query()]) -> Response:
+    async def latency(query: Annotated[LatencyQuery, Query()]) -> Response:
         """Mean and quantiles of each hop, clocks, and the figure."""
         now = clock()
-        parts = collect(watch.streams, asked.robot)
-        # What ten robots sent is merged in a thread, as sending all of it to the worker
-        # costs more; the figure of the sums is drawn there.
+        parts = collect(watch.streams.values(), query.robot)
+        # Merged in a thread: sending ten robots' sketches to the worker costs more.
+        # Only the figure of the sums is drawn there.
         sketches = await asyncio.to_thread(merge, parts)
         figures: dict[str, object] = {}
-        if asked.figures:
+        if query.figures:
             figures["cdf"] = orjson.Fragment(await worker.run(cdf_figure, sketches))
         answer = LatencyTable(
             at=format_stamp(now.wall),
-            robot=asked.robot,
+            robot=query.robot,
+            # Without it Δt₁ and Δt₂ cannot be told apart: FIWARE hides the boundary.
             direct=any(sketches[data, "uplink"].count for data in DATA),
             rows=[
                 LatencyRow(
@@ -100,9 +92,14 @@ def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
                 for place, rows in PAPER.items()
             },
             clocks=[
-                _clock(robot_id, one)
-                for robot_id, one in watch.clocks.items()
-                if asked.robot in (None, robot_id)
+                LatencyClock(
+                    robot_id=robot_id,
+                    state=offset.state,
+                    offset_ms=in_ms(offset.offset_s),
+                    uncertainty_ms=in_ms(offset.uncertainty_s),
+                )
+                for robot_id, offset in watch.clocks.items()
+                if query.robot in (None, robot_id)
             ],
             figures=figures,
         )

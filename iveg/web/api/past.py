@@ -19,7 +19,7 @@ MEDIA_TYPE = "application/vnd.mcap"
 
 
 def router(recordings: InputRecorder, past: Past, clock: Clock) -> APIRouter:
-    """Recordings, each as a file; and the world of then."""
+    """Recordings as files, and the world at a recorded moment."""
     routes = APIRouter(
         prefix="/api/v1",
         tags=["history"],
@@ -28,9 +28,9 @@ def router(recordings: InputRecorder, past: Past, clock: Clock) -> APIRouter:
 
     @routes.get("/recordings", response_model=Listing[Recording])
     async def listing() -> Response:
-        """Recordings of what came in, oldest first."""
+        """Recordings of inputs, oldest first."""
         files = await recordings.files()
-        return Json(Listing(items=[Recording.of(file) for file in files]))
+        return Json(Listing(items=[Recording.from_value(file) for file in files]))
 
     @routes.get(
         "/recordings/{recording_id}",
@@ -48,7 +48,7 @@ def router(recordings: InputRecorder, past: Past, clock: Clock) -> APIRouter:
     async def world(
         at: Annotated[Moment, Query(description="Which moment (ISO-8601)")],
     ) -> Response:
-        """The world at a recorded moment, as pages were told of it then."""
+        """The world at a recorded moment, as pages got it then."""
         wall = at.timestamp()
         if wall > clock().wall:
             raise HTTPException(422, "That moment is still to come.")

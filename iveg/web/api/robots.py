@@ -1,4 +1,4 @@
-"""REST twins of live topics (docs/interfaces/http.md), costmap and camera coverage."""
+"""REST copies of live topics (docs/interfaces/http.md), costmap and camera coverage."""
 
 from typing import Annotated
 
@@ -42,7 +42,7 @@ def router(views: Views, clock: Clock) -> APIRouter:
 
     @routes.get("/robots", response_model=Listing[Robot])
     async def robots() -> Response:
-        """The whole fleet, each robot with the age of what is said of it."""
+        """The whole fleet, each robot with the age of its data."""
         return Json(Listing(items=views.robots(clock())))
 
     @routes.get("/robots/{robot_id}", response_model=Robot)
@@ -86,7 +86,7 @@ def router(views: Views, clock: Clock) -> APIRouter:
 def cells_router(
     mapper: Mapper, evaluator: Evaluator, monitor: CoverageMonitor, clock: Clock
 ) -> APIRouter:
-    """Routes of cells of the map: what is taken, and what a camera saw."""
+    """Routes of costmaps and camera coverage."""
     routes = APIRouter(prefix="/api/v1", tags=["live"], dependencies=READERS)
 
     @routes.get(
@@ -96,7 +96,7 @@ def cells_router(
     async def costmap(
         robot: Annotated[str | None, Query(max_length=64)] = None,
     ) -> Response:
-        """The shared costmap, or what one robot believes.
+        """The shared costmap, or the costmap of one robot.
 
         Rows from the south, 0 free to 100 taken, -1 unknown.
         """
@@ -104,17 +104,18 @@ def cells_router(
         world = evaluator.world
         zones = zones_of(world, evaluator.people, evaluator.rule, now)
         if robot is None:
-            found = mapper.shared(zones, now)
+            grid = mapper.shared(zones, now)
         else:
-            found = mapper.of(world.robot(robot).robot_id, zones, now)
-        body = _json(found, mapper.age_s(robot, now))
+            # Through the world, which refuses an unknown robot (404).
+            grid = mapper.of_robot(world.robot(robot).robot_id, zones, now)
+        body = _json(grid, mapper.age_s(robot, now))
         return Response(body, media_type="application/json")
 
     @routes.get("/coverage", response_model=Coverage)
     async def coverage() -> Response:
-        """When a camera last looked at each cell of the aisles; null: never.
+        """Time of the last view of each cell of the aisles; null: never.
 
-        ``share`` of the cells (0-1) was looked at within ``within_s``; null where the
+        ``share`` of the cells (0-1) was in view within ``within_s``; null where the
         greenhouse has no aisles.
         """
         now = clock()
@@ -135,7 +136,7 @@ def _json(costmap: InflatedGrid | None, age_s: float | None) -> bytes:
     if costmap is None:
         return write_json(_NOTHING)
     grid = costmap.grid
-    # Cells by the hundred thousand go as they are: the model names them, no more.
+    # A costmap has up to 400,000 cells: no model checks each, orjson writes them.
     members = {
         "resolution": round(grid.resolution, 6),
         "width": grid.width,
@@ -150,15 +151,12 @@ def _json(costmap: InflatedGrid | None, age_s: float | None) -> bytes:
 def _lanes(monitor: CoverageMonitor, now: Instant) -> list[LaneCoverage]:
     pairs = zip(monitor.coverage.lanes, monitor.coverage.ages(now), strict=True)
     return [
-        LaneCoverage(
-            label=one.lane.label,
-            xmin=one.lane.area.xmin,
-            ymin=one.lane.area.ymin,
-            xmax=one.lane.area.xmax,
-            ymax=one.lane.area.ymax,
-            columns=one.columns,
-            rows=one.rows,
+        LaneCoverage.from_value(
+            cells.lane.area,
+            label=cells.lane.label,
+            columns=cells.columns,
+            rows=cells.rows,
             ages_s=ages,
         )
-        for one, ages in pairs
+        for cells, ages in pairs
     ]

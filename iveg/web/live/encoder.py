@@ -10,7 +10,7 @@ from iveg.web.views import Views
 
 
 class Encoder:
-    """Turns topics into frames, each version once."""
+    """Encodes topics as frames, each version once."""
 
     def __init__(self, views: Views, hub: Hub, clock: Clock) -> None:
         self._views, self._hub, self._clock = views, hub, clock
@@ -20,9 +20,9 @@ class Encoder:
     def frame(self, topic: str) -> bytes | None:
         """The newest frame of a topic without pacing; None without data."""
         version = self._hub.versions[topic]
-        kept = self._frames.get(topic)
-        if kept is not None and kept[0] == version:
-            return kept[1]
+        cached = self._frames.get(topic)
+        if cached is not None and cached[0] == version:
+            return cached[1]
         frame = self._encode(topic)
         if frame is not None:
             self._frames[topic] = version, frame

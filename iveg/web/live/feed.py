@@ -1,13 +1,13 @@
 """Telemetry for one browser: the newest values, at the browser's own pace.
 
-Positions go as often as the page paints.  Other parts go as often as eyes need: a scan
-or a detection frame is looked at, not measured, and digits that change more than ten
-times a second cannot be read.
+Positions go as often as the page paints.  Other parts go as often as eyes need: a
+person looks at a scan or a detection frame, and cannot read digits that change more
+than ten times a second.
 
 Buffers of the kernel, of the server and of the browser are queues without a size, and
-telemetry that waits in them shows the past.  So the page says which frame it has
-painted, and a few unpainted frames at most are on their way: further changes wait in
-slots, where the newest wins.  The same reports tell Δt₄, from the decision to the drawn
+telemetry that waits in them is old.  So the page reports its newest painted frame, and
+a few unpainted frames at most are on their way: further changes wait in slots, where
+the newest wins.  The same reports tell Δt₄, from the decision to the drawn
 frame.  Only frames that the server sent itself are measured, so a page can be wrong
 about the moment alone; an impossible moment is not used.
 """
@@ -20,7 +20,7 @@ from typing import Final
 from iveg.domain.latency import Data, LatencyWatch
 from iveg.domain.observations import Instant
 from iveg.vital import topics
-from iveg.vital.publish import Subscriber
+from iveg.vital.publish import Subscriber, drain
 from iveg.web.live.telemetry import LIST_S, Part, TelemetryEncoder, write_frame
 from iveg.web.presses import read_number
 
@@ -29,8 +29,11 @@ SUBPROTOCOL: Final = "iveg.2"
 
 FRAMES: Final = 6
 """Unpainted frames on their way: one alone would add a round trip to every age."""
-GAP_S: Final = 0.002
-"""Frames nearer to each other would cost more than the freshness that they bring."""
+CREDIT: Final = 16_000
+"""Unpainted bytes from which on frames have positions alone: they would wait 32 ms
+behind as many bytes on a radio of 4 Mbit/s."""
+GAP_S: Final = 0.004
+"""Least time between two frames (s): closer frames cost more than they gain."""
 
 _LEARNS: Final = 0.5
 
@@ -39,8 +42,8 @@ class CreditWindow:
     """The frames that one page has not painted yet; times are monotonic (s)."""
 
     def __init__(self) -> None:
-        self._unpainted: deque[tuple[int, float]] = deque()
-        """Number of each, and when it was sent."""
+        self._unpainted: deque[tuple[int, float, int]] = deque()
+        """Number of each frame, when it was sent (monotonic, s), and its bytes."""
         self._number = 0
         self._sent_at = float("-inf")
         self._round_trip_s = 0.0
@@ -51,29 +54,34 @@ class CreditWindow:
         return self._number + 1
 
     @property
-    def opens_at(self) -> float:
-        """When the next frame may go; ``inf``: not before one is painted.
+    def credit(self) -> int:
+        """Bytes that may be sent before the page paints another frame."""
+        return CREDIT - sum(size for _, _, size in self._unpainted)
 
-        Frames are spread over the round trip; together they would all be as old.
+    @property
+    def opens_at(self) -> float:
+        """Earliest time of the next frame (monotonic, s); ``inf``: wait for a report.
+
+        Frames are spread over the round trip; sent together they would age together.
         """
         if len(self._unpainted) >= FRAMES:
             return float("inf")
         spread_s = self._round_trip_s / FRAMES if self._unpainted else 0.0
         return self._sent_at + max(GAP_S, spread_s)
 
-    def sent(self, now: float) -> None:
-        """One more frame is on its way."""
-        self._number += 1
-        self._sent_at = now
-        self._unpainted.append((self._number, now))
+    def sent(self, size: int, now: float) -> None:
+        """One more frame of this size (bytes) is on its way."""
+        self._number, self._sent_at = self._number + 1, now
+        self._unpainted.append((self._number, now, size))
 
     def painted(self, number: object, now: float) -> bool:
-        """The page has painted this frame and all before; whether that was news."""
+        """Note that a page painted a frame and all before; returns False if known."""
+        # A page may report anything; only frames that were sent give credit.
         if type(number) is not int or number > self._number:
             return False
         if not self._unpainted or number < self._unpainted[0][0]:
             return False
-        # The oldest of them says how long the credit has been out.
+        # The oldest of these frames shows the age of the credit.
         away_s = now - self._unpainted[0][1]
         self._round_trip_s += _LEARNS * (away_s - self._round_trip_s)
         while self._unpainted and self._unpainted[0][0] <= number:
@@ -82,9 +90,9 @@ class CreditWindow:
 
 
 TRUSTED_S: Final = 0.1
-"""Half the shortest round trip (s): how well a page knows the server's clock."""
+"""Largest error of a page about the server's clock (s): half a round trip."""
 SAMPLE_S: Final = 0.1
-"""Between two samples of one topic and page: the hop is paced, and so is this."""
+"""Time between two latency samples of one topic and page (s)."""
 _SLACK_S: Final = 0.05
 
 _MEASURED: Final[Mapping[topics.Topic, Data]] = {
@@ -96,7 +104,7 @@ _Sample = tuple[str, Data, float]
 
 
 class Painting:
-    """The frames of one page that are on their way, and what was decided in them."""
+    """Frames on their way to a page, with the decisions whose latency they measure."""
 
     def __init__(self, watch: LatencyWatch) -> None:
         self._watch = watch
@@ -126,10 +134,10 @@ class Painting:
         """Take a page's report that it drew a frame, and all before, at a moment.
 
         Args:
-            number: Of the frame; it was on its way.
-            at: When, on the server's monotonic clock (s); None: nothing was drawn.
-            within: How wrong that may be (s).
-            now: When this was heard (monotonic, s).
+            number: Number of a frame that was on its way.
+            at: Moment on the server's monotonic clock (s); None: nothing was drawn.
+            within: Greatest error of ``at`` (s).
+            now: Moment of the report's arrival (monotonic, s).
         """
         drawn_at, doubt_s = read_number(at), read_number(within)
         while self._on_way and self._on_way[0][0] <= number:
@@ -147,18 +155,20 @@ class Painting:
         now: float,
     ) -> None:
         robot_id, data, decided_at = sample
+        # A page that knows the clock badly would make the hop look better or worse.
         if at is None or within is None or not 0.0 <= within <= TRUSTED_S:
             return
+        # Drawn before it was sent, or after the report came, is impossible.
         if sent_at - within - _SLACK_S <= at <= now + within + _SLACK_S:
             self._watch.painted(robot_id, data, decided_at, at)
 
 
 PICTURE_S: Final = 1 / 15
-"""Between two scans, or detection frames, of one robot."""
+"""Time between two scans, or detection frames, of one robot (s)."""
 STATE_S: Final = 0.2
-"""Between two states of one robot, whose digits are read."""
+"""Time between two states of one robot, whose digits people read (s)."""
 STATES_AFTER_S: Final = LIST_S / 2
-"""States of robots come this long after lists of people: each takes long to write."""
+"""Delay of robots' states after lists of people (s): both take long to encode."""
 
 _INF: Final = float("inf")
 
@@ -180,10 +190,10 @@ class TelemetryFeed:
         self._sent: dict[str, tuple[int, float]] = {}
 
     def painted(self, number: object, now: float, report: dict[str, object]) -> None:
-        """The page has painted a frame: there may be credit for another.
+        """Take a page's report that it painted a frame, which may free credit.
 
-        ``report``, all in its own words: ``at`` and ``within`` (s) are when; without
-        ``at`` it drew nothing.
+        ``report`` is the page's own message: it drew at ``at`` (s), within ``within``
+        (s); without ``at`` it drew nothing.
         """
         if type(number) is int and self.window.painted(number, now):
             self._painting.painted(number, report.get("at"), report.get("within"), now)
@@ -211,20 +221,21 @@ class TelemetryFeed:
             return None
         data = _write(self.window.next_number, moves, parts)
         self._painting.sent(self.window.next_number, now.mono)
-        self.window.sent(now.mono)
+        self.window.sent(len(data), now.mono)
         return data
 
     def _absorb(self) -> None:
-        for topic in self._subscriber.drain_telemetry():
+        for topic in drain(self._subscriber.telemetry):
             row, robot_id = topics.find(topic)
             if row is topics.ROBOT:
+                # The position goes with the next frame, the other members when due.
                 self._moved[topic] = None
-                topic = topics.ROBOT_STATE.of(robot_id)
+                topic = topics.ROBOT_STATE.for_id(robot_id)
             if topic not in self._waiting:
                 self._waiting[topic] = self._next_at(topic)
 
     def _next_at(self, topic: str) -> float:
-        """When a topic may be sent again (monotonic, s)."""
+        """Earliest time of a topic's next send (monotonic, s)."""
         if topic not in self._sent:
             return -_INF
         row, sent_at = topics.find(topic)[0], self._sent[topic][1]
@@ -235,8 +246,10 @@ class TelemetryFeed:
         return sent_at + PICTURE_S
 
     def _due_at(self) -> float:
-        """Earliest time at which something that waits may go."""
-        return -_INF if self._moved else min(self._waiting.values(), default=_INF)
+        """Earliest time at which a waiting topic may go."""
+        # Without credit pictures wait for a report, which wakes the line.
+        waiting = self._waiting.values() if self.window.credit > 0 else ()
+        return -_INF if self._moved else min(waiting, default=_INF)
 
     def _moves(self, now: Instant) -> list[bytes]:
         moves = []
@@ -250,12 +263,16 @@ class TelemetryFeed:
 
     def _due_parts(self, now: Instant) -> list[Part]:
         parts = []
+        room = self.window.credit
         for topic in [name for name, due in self._waiting.items() if due <= now.mono]:
+            if room <= 0:
+                break
             del self._waiting[topic]
             version = self._version(topic)
             part = self._part(topic, version, now)
             if part is not None and part.version != version:
                 parts.append(part)
+                room -= len(part.head) + len(part.body)
                 self._note_sent(topic, part, now)
         return parts
 
@@ -264,8 +281,8 @@ class TelemetryFeed:
         self._painting.adds(topic, now.mono)
 
     def _version(self, topic: str) -> int:
-        sent = self._sent.get(topic)
-        return -1 if sent is None else sent[0]
+        sent_version = self._sent.get(topic)
+        return -1 if sent_version is None else sent_version[0]
 
     def _part(self, topic: str, since: int, now: Instant) -> Part | None:
         row, key = topics.find(topic)
@@ -277,7 +294,7 @@ class TelemetryFeed:
 
 
 def _write(number: int, moves: list[bytes], parts: list[Part]) -> bytes:
-    """The frame as it is sent; what has a body is a scan."""
+    """The frame as it is sent; only scans have a body."""
     scans = [part for part in parts if part.body]
     head = b'{"frame":%d,"parts":[%b],"moves":[%b],"scans":[%b]}' % (
         number,
@@ -289,9 +306,10 @@ def _write(number: int, moves: list[bytes], parts: list[Part]) -> bytes:
 
 
 def _next_beat(sent_at: float, apart_s: float) -> float:
-    """When a read-out may be sent again (monotonic, s).
+    """Next common moment of a kind of read-out (monotonic, s).
 
-    Read-outs of a kind go together, at the same moments to all browsers: what takes
-    all robots and people is worked out once for all of them.
+    All browsers are sent a kind at the same moments, so the state of all robots and
+    people is computed once for all browsers.
     """
+    # The addend: rounding must not take a send at a beat for one just before it.
     return (math.floor(sent_at / apart_s + 1e-6) + 1) * apart_s

@@ -1,7 +1,7 @@
-"""Pictures of the past: what pages are sent, written down, and read back as a world.
+"""Recorded pictures: topics as pages get them, written and read back.
 
-A picture is what pages are sent of all topics (docs/interfaces/recordings.md): a whole
-one every ten seconds, between them what has changed.
+A picture holds the topics that pages are sent (docs/interfaces/recordings.md): a whole
+picture every ten seconds, between them only changes.
 """
 
 import asyncio
@@ -24,9 +24,9 @@ from iveg.web.live.telemetry import NO_RETURN
 from iveg.web.views import Views
 
 PICTURE_S: Final = 0.2
-"""Between two pictures."""
+"""Time between two pictures (s)."""
 REFUSED_S: Final = 2.0
-"""Until the next one where there was no room: a whole one costs more than changes."""
+"""Pause after a refused picture (s): the next is whole, which costs more."""
 _COMMANDS: Final = "commands"
 _AT_ONCE: Final = tuple(
     row.name
@@ -38,13 +38,13 @@ _LOG_LINES: Final = 200
 
 
 class PictureRecorder:
-    """Writes down what pages are sent, five times a second.
+    """Records the topics that pages get, five times a second.
 
     Args:
         encoder: Encodes scans.
-        views: The rest.
-        hub: Tells what has changed.
-        clock: For the time of pictures.
+        views: Reads all other topics.
+        hub: Has the version of each topic.
+        clock: Gives the time of pictures.
         write: Takes a picture and its moment; returns whether there was room.
     """
 
@@ -62,21 +62,22 @@ class PictureRecorder:
         self._begin_anew()
 
     def _begin_anew(self) -> None:
-        """Forget what the picture before had."""
+        """Forget the last picture, so that the next is whole."""
         self._versions: dict[str, int] = {}
         self._log_id = -1
         self._commands: object = None
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Take pictures until cancelled."""
         while True:
             is_taken = await self.take()
             await asyncio.sleep(PICTURE_S if is_taken else REFUSED_S)
 
     async def take(self) -> bool:
-        """One picture; whether it was taken.  Others have their turn between its parts.
+        """Take a picture; returns whether there was room for it.
 
-        One that was refused is followed by a whole one, as changes of it would be lost.
+        The loop has its turn between the parts.  After a refusal the next picture is
+        whole, because the changes in the refused picture are lost.
         """
         now = self._clock()
         is_whole = now.mono - self._whole_at >= WHOLE_S
@@ -105,7 +106,7 @@ class PictureRecorder:
     def _changed(self, *, is_whole: bool) -> Iterable[str]:
         versions = self._hub.versions
         if is_whole:
-            robots = map(topics.ROBOT.of, self._views.robot_ids)
+            robots = map(topics.ROBOT.for_id, self._views.robot_ids)
             return list(dict.fromkeys((*robots, *_AT_ONCE, *versions)))
         seen = self._versions
         return [name for name, version in versions.items() if seen.get(name) != version]
@@ -157,7 +158,7 @@ class Past:
     """The world of a recorded moment, made of pictures in a thread, one at a time.
 
     Args:
-        files: Has the pictures.
+        files: Finds recorded pictures.
     """
 
     def __init__(self, files: PictureFiles) -> None:
@@ -171,6 +172,7 @@ class Past:
             NotRecordedError: there is no picture of it.
             HopError: the disk refuses.
         """
+        # Many threads would take the processor from the loop in which a STOP waits.
         async with self._turn:
             return await asyncio.to_thread(self._world, wall)
 
@@ -187,8 +189,8 @@ class World:
     """State of a page, as pictures bring it up to date.
 
     Every value is kept with its moment on the monotonic clock of its server (s).
-    Earlier versions wrote only what had changed of a robot and of people, and poses by
-    themselves.
+    Earlier versions wrote only changed members of robots and people, and poses
+    separately.
     """
 
     def __init__(self) -> None:
@@ -203,7 +205,7 @@ class World:
         self._left_out: set[str] = set()
 
     def take(self, picture: dict[str, Any]) -> None:
-        """The next picture."""
+        """Apply the next picture."""
         self._at = picture["at"]
         for part in picture["parts"]:
             self._take(part["topic"], part["at"], part["data"])
@@ -213,17 +215,17 @@ class World:
     def _take(self, topic: str, at: float, data: Any) -> None:
         member, _, key = topic.partition("/")
         if member not in _MEMBERS:
-            # Another version sent it.
+            # A newer or older version of iVeg recorded it.
             self._left_out.add(topic)
         elif member == topics.ROBOT.member:
-            known = self._robots.get(key, (at, {}))[1]
-            self._robots[key] = at, {**known, **data}
+            self._robots[key] = at, {**self._robots.get(key, (at, {}))[1], **data}
         elif member == topics.PEOPLE.member:
             people = self._people
             people |= {
                 person["person_id"]: (person["at"], person)
                 for person in data["changed"]
             }
+            # The ids name all people who are still known; the others have left.
             self._people = {
                 name: people[name] for name in data["ids"] if name in people
             }
@@ -260,8 +262,8 @@ class World:
         robot = self._aged(self._robots[robot_id])
         move = self._moves.get(robot_id)
         if move is None:
-            still = dict.fromkeys(("pose", "twist", "stamp", "age_s"))
-            return {**still, **robot}
+            # Only earlier versions recorded poses apart; else its own members count.
+            return {**dict.fromkeys(("pose", "twist", "stamp", "age_s")), **robot}
         _, at, age_s, x, y, yaw, linear, angular, stamp = move
         motion = {
             "pose": {"x": x, "y": y, "yaw": yaw},
@@ -276,16 +278,16 @@ class World:
 
 
 def _older(value: Any, by: float) -> Any:
-    """A value when all of its ages are greater by so much (s)."""
+    """A value with ``by`` (s) added to all of its ages."""
     if isinstance(value, list):
         return [_older(item, by) for item in value]
     if not isinstance(value, dict):
         return value
     return {
-        key: round(one + by, 3)
-        if key == "age_s" and one is not None
-        else _older(one, by)
-        for key, one in value.items()
+        key: round(member + by, 3)
+        if key == "age_s" and member is not None
+        else _older(member, by)
+        for key, member in value.items()
     }
 
 

@@ -6,8 +6,8 @@ newest values; a browser that reads nothing keeps no queue and is closed after a
 else passes beside them at once.
 
 Data that the kernel and the server hold for a slow browser form a queue in front of the
-slots where the newest wins.  Credit bounds it for telemetry; ``BoundedSocket`` bounds
-it for all else, too.
+slots where the newest wins.  Credit bounds this queue for telemetry, ``BoundedSocket``
+for all else.
 """
 
 import asyncio
@@ -32,7 +32,7 @@ from iveg.models.snapshot import Snapshot
 from iveg.ngsi.codec import load_json
 from iveg.vital import topics
 from iveg.vital.ports import Clock
-from iveg.vital.publish import Hub, Subscriber
+from iveg.vital.publish import Hub, Subscriber, drain
 from iveg.web.live.encoder import Encoder, frame_text
 from iveg.web.live.feed import SUBPROTOCOL, Painting, TelemetryFeed
 from iveg.web.presses import read_press
@@ -46,14 +46,14 @@ Stop = Callable[[str | None, Principal, Press], Awaitable[object]]
 
 
 SEND_BUFFER: Final = 65536
-"""In the kernel (bytes, Linux doubles it): 0.2 MB/s over a round trip of 300 ms."""
+"""Kernel's send buffer (bytes; Linux doubles it): 0.2 MB/s at 300 ms round trip."""
 
 
 class BoundedSocket(WebSocketsSansIOProtocol):
-    """Sends a message when the kernel has taken all of the one before."""
+    """Sends a message only once the kernel has taken the whole one before."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Called once the connection speaks WebSocket."""
+        """Bound the buffers of a connection that has begun to speak WebSocket."""
         super().connection_made(transport)
         self.transport.set_write_buffer_limits(high=0)
         kernel: socket.socket | None = transport.get_extra_info("socket")
@@ -62,25 +62,25 @@ class BoundedSocket(WebSocketsSansIOProtocol):
 
 
 def current_principal(websocket: WebSocket, action: Action) -> Principal | None:
-    """The person or program as of now; None: it may not, or not any more."""
+    """The caller, if the role still allows the action; else None."""
     current = authenticator_of(websocket).identify(websocket)
     return current if current is not None and current.may(action) else None
 
 
 TOO_SLOW = 4008
 _READ_WITHIN_S = 10.0
-"""How long a browser may take to read one message."""
+"""Time in which a browser has to read a message (s)."""
 
 
 class Line:
     """Messages to one browser, one after the other, and messages from it.
 
-    Answers go out with all else, so that a press is read at once also where the way
-    back is full.
+    Answers wait in the queue of all messages.  So a press is read at once even while
+    nothing can be sent.
 
     Args:
         feed: Makes its telemetry.
-        within_s: How long a browser may take to read one message.
+        within_s: Time in which a browser has to read a message (s).
     """
 
     def __init__(
@@ -101,17 +101,17 @@ class Line:
         await self._sent(self._websocket.send_text(frame.decode()))
 
     async def send(self) -> None:
-        """Send all there is, as fast as the browser reads; telemetry as it paints."""
+        """Send all messages as fast as the browser reads; telemetry as it paints."""
         while not self._subscriber.overflowed:
             await self._subscriber.news(self._feed.wait_s(self._clock().mono))
             frame = self._feed.next_frame(self._clock())
             if frame is not None:
                 await self._sent(self._websocket.send_bytes(frame))
-            for topic, item in self._subscriber.drain_events():
+            for topic, item in drain(self._subscriber.pending):
                 await self.say(self._encoder.event(topic, item))
-            for topic in self._subscriber.drain_topics():
-                if (told := self._encoder.frame(topic)) is not None:
-                    await self.say(told)
+            for topic in drain(self._subscriber.dirty):
+                if (data := self._encoder.frame(topic)) is not None:
+                    await self.say(data)
         await self.close(TOO_SLOW)
 
     async def close(self, code: int) -> None:
@@ -119,15 +119,16 @@ class Line:
         await self._sent(self._websocket.close(code))
 
     async def _sent(self, sending: Coroutine[object, object, None]) -> None:
-        """Send; of a socket that has closed meanwhile a server says RuntimeError.
+        """Send, and turn the errors of a closed or blocked socket into one kind.
 
         Raises:
-            ConnectionError: the browser is gone, or reads nothing.
+            ConnectionError: the browser has left, or reads nothing.
         """
         try:
             async with asyncio.timeout(self._within_s):
                 await sending
         except RuntimeError as error:
+            # The server's error for a socket that has closed meanwhile.
             raise ConnectionResetError(str(error)) from error
         except TimeoutError as error:
             with suppress(RuntimeError, TimeoutError):
@@ -140,6 +141,7 @@ class Line:
         while self._websocket.application_state is WebSocketState.CONNECTED:
             raw = await self._websocket.receive_text()
             try:
+                # A longer message is cut: the rest is no JSON and is refused.
                 message = load_json(raw[:_MAX_MESSAGE])
             except UnreadableError as error:
                 self._complain(error.reason)
@@ -158,10 +160,11 @@ class Line:
 
     async def _press(self, message: dict[str, object], stop: Stop) -> None:
         robot_id = message.get("robot_id")
-        who = current_principal(self._websocket, "stop")
-        if who is not None and (robot_id is None or isinstance(robot_id, str)):
+        # Asked anew at each press: the account may have been disabled meanwhile.
+        principal = current_principal(self._websocket, "stop")
+        if principal is not None and (robot_id is None or isinstance(robot_id, str)):
             try:
-                await stop(robot_id, who, read_press(message))
+                await stop(robot_id, principal, read_press(message))
             except UnknownRobotError as error:
                 self._complain(legible(str(error)))
 
@@ -193,9 +196,8 @@ def router(
 ) -> APIRouter:
     """The live endpoint.
 
-    ``snapshot`` gives the present state to a new browser; ``stop``
-    presses STOP for one robot, or for all, by somebody; ``latency`` is told when pages
-    have drawn what was decided.
+    ``snapshot`` gives the present state to a new browser.  ``stop`` presses STOP for
+    one robot, or for all.  ``latency`` takes the moments at which pages drew decisions.
     """
     routes = APIRouter()
 
@@ -211,6 +213,7 @@ def router(
             await websocket.close(NO_PROTOCOL)
             return
         await websocket.accept(SUBPROTOCOL)
+        # Joined before the snapshot: news that comes while it is sent is not lost.
         subscriber = hub.join()
         feed = TelemetryFeed(encoder.telemetry, subscriber, Painting(latency))
         line = Line(websocket, subscriber, encoder, feed, clock)
@@ -220,19 +223,19 @@ def router(
                 frame_text(topics.SNAPSHOT.name, snapshot(principal, now), now)
             )
             async with asyncio.TaskGroup() as tasks:
-                others = [
+                tasks_beside = [
                     tasks.create_task(line.send(), name="live-send"),
                     tasks.create_task(line.watch(), name="live-watch"),
                 ]
                 with suppress(WebSocketDisconnect):
                     await line.listen(stop)
-                for task in others:
+                for task in tasks_beside:
                     task.cancel()
-        except* (WebSocketDisconnect, ConnectionError) as gone:
-            _log.debug("browser gone: %s", gone)
+        except* (WebSocketDisconnect, ConnectionError) as loss:
+            _log.debug("live: browser lost: %s", loss)
         except* Exception:
             # A fault of ours, logged as one; the browser reconnects by itself.
-            _log.exception("live: the line of a browser has failed")
+            _log.exception("live: the connection of a browser has failed")
         finally:
             hub.leave(subscriber)
 

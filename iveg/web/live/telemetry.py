@@ -22,11 +22,11 @@ from iveg.vital.publish import Hub
 from iveg.web.views import Views
 
 LIST_S: Final = 0.1
-"""Between two lists of people."""
+"""Time between two lists of people (s)."""
 PEOPLE_A_BEAT: Final = 50
-"""Of more the list is sent so much less often: each takes 0.1 ms to write."""
+"""People in a list at full rate; a longer one comes less often (0.1 ms a person)."""
 UNIT_M: Final = 0.005
-"""Unit of a range: finer than a map shows, and 327 m fit in 16 bits."""
+"""Unit of a range (m): finer than a map shows, and 327 m fit in 16 bits."""
 NO_RETURN: Final = 0xFFFF
 
 
@@ -34,6 +34,7 @@ def write_ranges(scan: LaserScan) -> bytes:
     """Ranges as ``uint16`` in ``UNIT_M``, little-endian, padded to four bytes."""
     ranges = scan.ranges
     units = np.full(ranges.size + ranges.size % 2, NO_RETURN, "<u2")
+    # Longer ranges would wrap round in 16 bits and draw a wall nearby.
     counts = scan.returns() & (ranges < UNIT_M * NO_RETURN)
     units[: ranges.size][counts] = np.rint(ranges[counts] / UNIT_M)
     return units.tobytes()
@@ -47,9 +48,9 @@ class Part(NamedTuple):
     """One topic's share of a frame.
 
     Attributes:
-        version: Of the topic when it was encoded; a browser that has it needs no newer.
+        version: Version of the topic; a browser that has it needs nothing newer.
         head: JSON.
-        body: What follows the JSON of the frame; a multiple of four bytes.
+        body: Bytes after the JSON of the frame; a multiple of four.
     """
 
     version: int
@@ -58,7 +59,7 @@ class Part(NamedTuple):
 
 
 class TelemetryEncoder:
-    """Encodes each part when the first browser asks for it."""
+    """Encodes each part once, when the first browser needs it."""
 
     def __init__(self, views: Views, hub: Hub) -> None:
         self._views = views
@@ -84,22 +85,23 @@ class TelemetryEncoder:
         odometry = robot.odometry
         if odometry is None:
             return None
-        kept = self._moves.get(robot_id)
-        if kept is not None and kept[0] is odometry:
-            return kept[1]
+        cached = self._moves.get(robot_id)
+        # Encoded with its first age: ``at`` lets each page add the time since.
+        if cached is not None and cached[0] is odometry:
+            return cached[1]
         pose, twist = odometry.pose, odometry.twist
         place = round(pose.x, 3), round(pose.y, 3), round(pose.yaw, 4)
         speed = round(twist.linear_x, 3), round(twist.angular_z, 3)
         age_s = rounded(robot.age_s(now))
         head = [robot_id, now.mono, age_s, *place, *speed, odometry.origin.stamp]
-        version = self._hub.versions[topics.ROBOT.of(robot_id)]
+        version = self._hub.versions[topics.ROBOT.for_id(robot_id)]
         part = Part(version, orjson.dumps(head))
         self._moves[robot_id] = odometry, part
         return part
 
     def state(self, robot_id: str, since: int, now: Instant) -> Part | None:
-        """Other members of a robot that have changed since a version; None for none."""
-        topic = topics.ROBOT.of(robot_id)
+        """Members of a robot that changed since a version; None without a change."""
+        topic = topics.ROBOT.for_id(robot_id)
         state = self._states.setdefault(robot_id, _RobotState())
         if state.version != self._hub.versions[topic]:
             robot = self._views.robot(robot_id, now, self._margins_at(now))
@@ -110,16 +112,15 @@ class TelemetryEncoder:
         """The list of people, and changes since a version; None without a change."""
         version = self._hub.versions[topics.PEOPLE.name]
         if self._people.version != version:
-            people = self._views.people(now)
-            self._people.update(people, version, now.mono)
+            self._people.update(self._views.people(now), version, now.mono)
         return self._people.changes(since)
 
     def part(self, topic: str, now: Instant) -> Part | None:
         """A scan or one detection frame; None where there is none."""
         version = self._hub.versions[topic]
-        kept = self._parts.get(topic)
-        if kept is not None and kept.version == version:
-            return kept
+        cached = self._parts.get(topic)
+        if cached is not None and cached.version == version:
+            return cached
         part = self._encode(topic, version, now)
         if part is not None:
             self._parts[topic] = part
@@ -136,7 +137,7 @@ class TelemetryEncoder:
             try:
                 return self._scan(topic, robot_id, version, now)
             except Exception as error:
-                # Else it would end the line of every browser.
+                # One robot's scan must not end the connection of every browser.
                 self._views.reject(robot_id, "undrawable_scan", repr(error))
                 return None
         data = self._views.frame(robot_id, now)
@@ -171,7 +172,7 @@ class TelemetryEncoder:
 
 
 class _RobotState:
-    """A robot's members, each encoded when it differs from what it was."""
+    """A robot's members, each encoded when its value has changed."""
 
     def __init__(self) -> None:
         self.version = -1
@@ -219,6 +220,7 @@ class _People:
         ids = [person.person_id for person in people]
         if ids != self._ids:
             self._ids, self._changed = ids, version
+        # People who have left are forgotten; a new id has no value to compare with.
         self._values = {name: self._values.get(name) for name in ids}
         self._texts = {name: self._texts[name] for name in ids if name in self._texts}
         for person in people:
@@ -226,7 +228,7 @@ class _People:
             if self._values[person.person_id] == value:
                 continue
             self._values[person.person_id] = value
-            # Its age counts from here, whichever browser takes it later.
+            # The age counts from ``at``, also for a browser that takes the part later.
             text = b'%b,"at":%b}' % (write_json(person)[:-1], orjson.dumps(at))
             self._texts[person.person_id] = version, text
             self._changed = version
@@ -237,7 +239,7 @@ class _People:
         return len(self._ids)
 
     def changes(self, since: int) -> Part | None:
-        """The list of people, and those who changed since a version."""
+        """The list of people, and the people who changed since a version."""
         if self._changed <= since:
             return None
         newer = [text for version, text in self._texts.values() if version > since]

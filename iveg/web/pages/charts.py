@@ -1,9 +1,9 @@
-"""Rows become Plotly figures; the only importer of plotly.
+"""Plotly figures of rows; the only importer of plotly.
 
 The package checks every figure as it is made.  The browser draws it with the basic
 bundle of the same version, which lies beside the page (docs/decisions, "What each
-dependency is for").  ``meta`` names what a trace or an axis shows, and the page puts
-the words in the reader's language.
+dependency is for").  ``meta`` names the quantity of a line or an axis; the page has
+its words in the reader's language.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -34,11 +34,11 @@ _MOST_POINTS: Final = 200
 def figure_of(
     traces: Sequence[Trace], axes: tuple[str, str], layout: Mapping[str, object]
 ) -> bytes:
-    """A figure as JSON; ``axes`` say what they show.
+    """A figure as JSON; ``axes`` names the quantities on x and y.
 
     Checked by the package: a wrong name or value raises here, not in a browser.
     """
-    # Half of its users never open a chart, and the package is slow to load.
+    # Half of all users never open a chart, and the package is slow to load.
     from plotly.graph_objects import Figure
 
     figure = Figure(data=list(traces), layout=dict(layout))
@@ -71,16 +71,18 @@ def _times(moments: Iterable[float]) -> list[float]:
 
 
 def cdf_figure(sketches: Mapping[Cell, Sketch]) -> bytes:
-    """Which share of the messages took no longer than so many ms."""
+    """Distribution of latencies: share of the messages within a time (ms)."""
     layout = {"xaxis": {"type": "log"}, "yaxis": {"range": [0, 1]}}
     curves = []
     for data, hop in product(DATA, _STEPS):
         edges, shares = sketches[data, hop].distribution()
         if edges:
+            # A line of thousands of steps would look the same; the last stays, at 1.
             every = max(1, len(edges) // _MOST_POINTS)
-            kept = [*range(0, len(edges) - 1, every), len(edges) - 1]
-            x = [round(max(0.01, 1000.0 * edges[place]), 3) for place in kept]
-            y = [round(shares[place], 4) for place in kept]
+            indices = [*range(0, len(edges) - 1, every), len(edges) - 1]
+            # A logarithmic axis has no zero.
+            x = [round(max(0.01, 1000.0 * edges[place]), 3) for place in indices]
+            y = [round(shares[place], 4) for place in indices]
             meta = {"hop": hop, "data": data}
             curves.append(_line(f"{data} {hop}", x, y, meta, line={"shape": "hv"}))
     return figure_of(curves, ("ms", "share"), layout)
@@ -92,7 +94,9 @@ def cdf_figure(sketches: Mapping[Cell, Sketch]) -> bytes:
 def history_figures(speeds: Lines, fleet: FleetDescription) -> dict[str, bytes]:
     """The figures of a range by name, one of speed for each robot: R2 before R10."""
     robots = sorted((robot for (robot,) in speeds), key=as_counted)
-    return {f"speed/{one}": speed_figure(one, speeds[one,], fleet) for one in robots}
+    return {
+        f"speed/{robot}": speed_figure(robot, speeds[robot,], fleet) for robot in robots
+    }
 
 
 def speed_figure(robot: str, series: Series, fleet: FleetDescription) -> bytes:
@@ -100,11 +104,11 @@ def speed_figure(robot: str, series: Series, fleet: FleetDescription) -> bytes:
 
     The limit is the factor times the robot's greatest speed; while it is lower the
     figure is shaded.  Lines break where no data came for 5 s: a line through silence
-    would be invented.
+    would be false.
     """
     fastest = fleet.of_robot(robot).profile.max_speed
     factors = np.array(series.values["limit_factor"], float)
-    drawn = {
+    lines = {
         "speed": (np.array(series.values["linear"], float).round(3).tolist(), {}),
         "mandated": ((fastest * factors).tolist(), {"shape": "hv"}),
     }
@@ -117,13 +121,14 @@ def speed_figure(robot: str, series: Series, fleet: FleetDescription) -> bytes:
         _series_line(
             series, values, _SILENCE_S, {"kind": kind, "robot": robot}, line=line
         )
-        for kind, (values, line) in drawn.items()
+        for kind, (values, line) in lines.items()
     ]
     return figure_of(traces, ("time", "speed"), layout)
 
 
 def _slow_downs(at: Sequence[float], is_slow: NDArray[np.bool_]) -> Iterator[Trace]:
     """A shade for each time with a speed limit below full speed."""
+    # Ends count as full speed, so begins and ends of shades come in pairs.
     turns = np.flatnonzero(np.diff(is_slow, prepend=False, append=False)).tolist()
     times = _times([*at, *at[-1:]])
     for since, until in zip(turns[::2], turns[1::2], strict=True):
@@ -142,40 +147,41 @@ def _slow_downs(at: Sequence[float], is_slow: NDArray[np.bool_]) -> Iterator[Tra
 def climate_figures(lines: Lines) -> dict[str, bytes]:
     """Temperature (°C), relative humidity (%) and CO₂ (ppm) over time, as JSON.
 
-    A figure is empty where its sensor was silent all along; lines break where nothing
-    was heard for five minutes.
+    A figure is empty without any value of its sensor; lines break where no row came for
+    five minutes.
     """
     air = lines.get((), Series((), {}))
     humidity = air.values.get("relative_humidity", ())
-    drawn = {
+    figures = {
         "temperature": air.values.get("temperature", ()),
-        "humidity": [None if one is None else 100.0 * one for one in humidity],
+        "humidity": [None if share is None else 100.0 * share for share in humidity],
         "co2": air.values.get("co2", ()),
     }
-    return {kind: _air_figure(air, kind, values) for kind, values in drawn.items()}
+    return {kind: _air_figure(air, kind, values) for kind, values in figures.items()}
 
 
 def equipment_figures(lines: Lines) -> dict[str, bytes]:
     """Each attribute of other equipment over time, as JSON, by entity and attribute."""
     return {
-        "/".join(key): _air_figure(one, "measurement", one.values["value"])
-        for key, one in lines.items()
+        "/".join(key): _air_figure(series, "measurement", series.values["value"])
+        for key, series in lines.items()
     }
 
 
 def _air_figure(series: Series, kind: str, values: Values) -> bytes:
-    """A line with its points, broken where nothing was heard for long."""
-    is_heard = any(value is not None for value in values)
+    """A line with its points, broken where no row came for five minutes."""
+    has_values = any(value is not None for value in values)
     look = {"mode": "lines+markers", "marker": {"size": 4}}
     line = _series_line(series, values, _AIR_SILENCE_S, {"kind": kind}, **look)
-    traces = [line] if is_heard else []
+    traces = [line] if has_values else []
     return figure_of(traces, ("time", kind), {"showlegend": False})
 
 
 def _series_line(
     series: Series, values: Values, silence_s: float, meta: Trace, **more: object
 ) -> Trace:
-    """A line that breaks where no row came for so long (s)."""
+    """A line that breaks after this time without a row (s)."""
+    # Means over slices come a slice apart, which is no silence.
     longest_s = max(silence_s, 3 * series.slice_s)
     gaps = np.flatnonzero(np.diff(series.at) > longest_s) + 1
     times = np.array(_times(series.at))

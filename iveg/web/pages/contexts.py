@@ -12,7 +12,7 @@ from iveg.domain.transports import TRANSPORTS
 
 Theme = Literal["auto", "light", "dark", "sunlight"]
 HUES = 10
-"""Robots that have a hue of their own."""
+"""Number of hues; more robots than that share them."""
 THEMES: dict[str, Theme] = {theme: theme for theme in get_args(Theme)}
 
 
@@ -21,31 +21,31 @@ class Site:
     """Facts about this server that every page shows.
 
     Attributes:
-        greenhouse: Name as people say it.
+        greenhouse: Its name.
         robots: Ids in fleet order; the order decides each robot's colour.
         demo: The robots are emulated.
         transports: Ids, in the order of their columns.
         link: One link signs people in; else passwords alone do.
-        sso: What the button of the identity provider says; None: there is none.
+        sso: Label of the identity provider's button; None: there is no provider.
     """
 
     greenhouse: str
     robots: tuple[str, ...]
     version: str
     demo: bool
-    transports: tuple[str, ...] = tuple(one.id for one in TRANSPORTS)
+    transports: tuple[str, ...] = tuple(transport.id for transport in TRANSPORTS)
     link: bool = True
     sso: str | None = None
 
     @property
     def slots(self) -> dict[str, int]:
-        """Which of the hues in ``css/tokens.css`` is each robot's own, from 1."""
+        """Robot → number of its hue in ``css/tokens.css``, from 1."""
         return {robot: n % HUES + 1 for n, robot in enumerate(self.robots)}
 
 
 @dataclass(frozen=True, slots=True)
 class Appearance:
-    """Appearance that this browser chose; remembered in its cookies."""
+    """Appearance that a reader chose, kept in the browser's cookies."""
 
     language: str = "es"
     theme: Theme = "auto"
@@ -58,9 +58,9 @@ class PageFrame:
 
     Attributes:
         route: Name of the page: of its template, and of its entry in the navigation.
-        name: Who is signed in; None shows neither navigation nor STOP.
+        name: Name of the reader; None shows neither navigation nor STOP.
         role: ``viewer``, ``operator``, ``admin`` or ``program``.
-        account: Whether they have one of their own.
+        account: Whether the reader has an account.
     """
 
     site: Site

@@ -1,4 +1,4 @@
-"""Draws pages: a context by its template, in the reader's language."""
+"""Drawing of pages: a context by its template, in the reader's language."""
 
 import json
 from collections.abc import Mapping
@@ -36,7 +36,7 @@ def limits_text() -> str:
 def rule_parameters_text() -> str:
     """The parameters of the rule, as ``static/js/pages/parameters.js`` reads them."""
     keys = ("key", "class_key", "unit", "protects", "word")
-    return json.dumps([{key: getattr(one, key) for key in keys} for one in PARAMETERS])
+    return json.dumps([{key: getattr(row, key) for key in keys} for row in PARAMETERS])
 
 
 def _time_of_day(stamp: str) -> str:
@@ -50,6 +50,7 @@ def environment_of(texts: Sentences) -> Environment:
     def tell(key: str, **slots: object) -> str:
         return texts.say(key, slots)
 
+    # The page itself fills the sentence anew when its language is switched.
     def slots_of(slots: Mapping[str, object]) -> Markup:
         if not slots:
             return Markup()
@@ -75,6 +76,7 @@ def environment_of(texts: Sentences) -> Environment:
     environment = Environment(
         loader=FileSystemLoader(str(files("iveg") / "templates")),
         autoescape=True,
+        # A misspelt name fails in the tests, not as a gap on the page.
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -101,7 +103,7 @@ class Pages:
     """Draws pages; one for the life of the server.
 
     Args:
-        site: What every page of this server has in common.
+        site: Facts that all pages of this server share.
     """
 
     def __init__(self, site: Site) -> None:
@@ -129,12 +131,13 @@ class Pages:
         Args:
             frame: Surrounds it; its route names the template.
             code: HTTP status.
-            added: What else the template sees as members of ``page``.
+            added: Further members of ``page`` in the template.
         """
         template = self._environments[frame.look.language].get_template(
             f"{frame.route}.html"
         )
         html = template.render(page={"frame": frame, **added})
+        # One address has several languages and looks: no cache may mix them up.
         return HTMLResponse(html, code, {"Vary": "Cookie, Accept-Language"})
 
     def problem(self, request: Request, problem: Problem) -> Response:
@@ -142,9 +145,9 @@ class Pages:
         if problem.status == 401:
             return self.sign_in(request, 401)
         known = problem.status if problem.status in _EXPLAINED else "other"
-        # Somebody signed in keeps the STOP controls, whatever page went wrong.
-        who = authenticator_of(request).identify(request)
-        frame = self.frame(request, "error", who)
+        # A person who is signed in keeps the STOP controls on every failed page.
+        principal = authenticator_of(request).identify(request)
+        frame = self.frame(request, "error", principal)
         code, sentence = problem.status, f"error.{known}"
         response = self.draw(frame, code, status=code, sentence=sentence)
         response.headers.update(problem.headers)

@@ -1,4 +1,4 @@
-"""Addresses of the HTML pages and of sign-in; each page is one context to draw."""
+"""Routes of the HTML pages and of sign-in; each page is a context to draw."""
 
 from collections.abc import Callable
 from functools import partial
@@ -44,18 +44,18 @@ _SCRIPTED: Final[dict[Action, dict[str, str]]] = {
     "release": {"audit": "/audit"},
     "admin": {"users": "/users", "tokens": "/tokens", "sessions": "/sessions"},
 }
-"""Pages that scripts fill, and their addresses, by what they ask for."""
+"""Pages that scripts fill: required action → name → address."""
 _MOVED: Final = {
     "/compare": "/day",
     "/docs": "/openapi.json",
     "/experiments": "/latency",
     "/what-if": "/settings",
 }
-"""Addresses of pages that are gone, and where their readers are sent."""
+"""Addresses of removed pages → their successors."""
 
 
 def service_worker_router() -> APIRouter:
-    """One file at the root, where its scope is every page; nothing secret is in it."""
+    """The service worker: at the root, so that its scope is every page; no secrets."""
     routes = APIRouter(include_in_schema=False)
 
     @routes.get("/sw.js", dependencies=STRANGERS)
@@ -77,7 +77,7 @@ def router(
     """The routes of all pages.
 
     Args:
-        pages: What draws them.
+        pages: Draws them.
         rule: The version in force.
         sign_on: Signs people in at the identity provider; None: there is none.
     """
@@ -123,15 +123,17 @@ def _add_scripted(
 
 
 def _add_moved(routes: APIRouter, old: str, new: str) -> None:
-    """Lead the address of a page that is gone to the page that took its place."""
+    """Redirect the address of a removed page to its successor."""
 
     @routes.get(old, dependencies=READERS, response_model=None)
     async def moved() -> Response:
+        # Permanent: from then on a browser goes straight to the new page.
         return RedirectResponse(new, 308)
 
 
 # --- people come in and go --------------------------------------------------------
 
+# Every other failure is a refusal of the person (403).
 _STATUS: Final = {"unreachable": 503, "busy": 429, "outdated": 400}
 
 
@@ -149,7 +151,7 @@ class _ByPassword(Body):
 
 
 class _ByInvitation(Body):
-    """An invitation, and the password that is to be."""
+    """An invitation, and the new password."""
 
     invitation: str = Field(max_length=256)
     password: str = Field(min_length=LEAST, max_length=MOST)
@@ -177,7 +179,7 @@ def _add_signing(routes: APIRouter, pages: Pages) -> None:
         proof = partial(people.accept, body.invitation, body.password)
         return await authenticator.prove(request, proof)
 
-    # Whose session is past its age can end it, too.
+    # A session past its age may only stop, and can still be ended.
     @routes.post(
         "/signout", response_model=None, dependencies=[Depends(require("stop"))]
     )
@@ -186,7 +188,7 @@ def _add_signing(routes: APIRouter, pages: Pages) -> None:
 
 
 def _add_single_sign_on(routes: APIRouter, pages: Pages, sign_on: SingleSignOn) -> None:
-    """Add the way to the identity provider and back, as a person's browser goes it."""
+    """Add the routes by which a browser goes to the identity provider and back."""
 
     def refused(request: Request, error: SignOnError) -> Response:
         status = _STATUS.get(error.failure, 403)
@@ -208,6 +210,7 @@ def _add_single_sign_on(routes: APIRouter, pages: Pages, sign_on: SingleSignOn) 
         except SignOnError as error:
             return refused(request, error)
         response = pages.draw(pages.frame(request, "entered"), to=to)
-        # A redirect would still be the provider's, and leave the Strict cookie behind.
+        # After a redirect the request would still count as the provider's, and browsers
+        # would leave the Strict cookie behind.
         response.headers["Refresh"] = f"0; url={to}"
         return authenticator_of(request).admit(request, token, response)

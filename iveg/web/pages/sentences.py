@@ -21,21 +21,21 @@ _HOUR = timedelta(hours=1)
 
 
 def in_madrid(at: float) -> datetime:
-    """A moment (Unix s) on the wall clock; the value holds no zone."""
+    """A moment (Unix s) as Madrid's time; the value holds no time zone."""
     moment = datetime.fromtimestamp(at, UTC).replace(tzinfo=None)
     return moment + (2 * _HOUR if _is_summer(moment) else _HOUR)
 
 
 def local_stamp(at: float) -> str:
-    """A moment (Unix s) on the wall clock, to the second."""
+    """A moment (Unix s) as Madrid's time, to the second."""
     return f"{in_madrid(at):%Y-%m-%d %H:%M:%S}"
 
 
 def start_of(day: date) -> float:
-    """When a day begins there (Unix s); clocks never change at midnight."""
+    """Begin of a day in Madrid (Unix s); clocks never change at midnight."""
     midnight = datetime(day.year, day.month, day.day)  # noqa: DTZ001 - a wall clock
-    ahead = 2 * _HOUR if _is_summer(midnight - _HOUR) else _HOUR
-    return (midnight - ahead).replace(tzinfo=UTC).timestamp()
+    offset_s = 2 * _HOUR if _is_summer(midnight - _HOUR) else _HOUR
+    return (midnight - offset_s).replace(tzinfo=UTC).timestamp()
 
 
 def _is_summer(moment: datetime) -> bool:
@@ -49,7 +49,7 @@ def _last_sunday(year: int, month: int) -> datetime:
 
 
 LANGUAGES = ("es", "en")
-"""Both complete; the first is the one for readers of neither."""
+"""Both are complete; the first is for readers of neither."""
 
 HOLE: Final = re.compile(r"\{(\w+)(?::(\w+))?\}")
 
@@ -66,6 +66,7 @@ def preferred_language(accept: str) -> str:
     return LANGUAGES[0]
 
 
+# The suffix only keeps ids apart over days; people say the number.
 _TRACK = re.compile(r"([PR])(\d+)(?:-[0-9a-f]+)?")
 _NOTHING: Final = "—"
 _NAMED: Final = {
@@ -101,21 +102,20 @@ class Sentences:
     def say(self, key: str, slots: Slots) -> str:
         """A sentence with its holes filled.
 
-        A missing one is its key, so that a row of an older version is never lost.
+        Without a sentence it is the key, so that rows of older versions are never lost.
         """
         head = key.rpartition(".")[0]
-        for one in (key, f"{head}.default", f"{key}.default"):
-            if one in self.sentences:
+        for name in (key, f"{head}.default", f"{key}.default"):
+            if name in self.sentences:
                 return HOLE.sub(
                     lambda hole: self._write(slots.get(hole[1]), hole[2], slots),
-                    self.sentences[one],
+                    self.sentences[name],
                 ).strip()
         return key
 
     def percent(self, share: float) -> str:
         """A share as browsers write it: Spanish keeps the sign on the number's line."""
-        sign = "\u00a0%" if self.language == "es" else "%"
-        return f"{100 * share:.0f}{sign}"
+        return f"{100 * share:.0f}" + ("\u00a0%" if self.language == "es" else "%")
 
     def decimal(self, number: str) -> str:
         """A number with the decimal sign of the language."""
@@ -124,9 +124,9 @@ class Sentences:
     def lane(self, label: str) -> str:
         """An aisle in the reader's words; a name that a grower gave stays."""
         for form, key in _LANES:
-            found = form.fullmatch(label)
-            if found:
-                return self.say(key, {"n": "".join(found.groups())})
+            match = form.fullmatch(label)
+            if match:
+                return self.say(key, {"n": "".join(match.groups())})
         return label
 
     def _write(self, value: object, form: str | None, slots: Slots) -> str:
@@ -137,13 +137,13 @@ class Sentences:
         if form == "person":
             return self._person(str(value))
         if form == "own":
-            # What the grower calls it in this language, as the equipment's file says.
+            # The grower's name for it in this language, from the equipment file.
             return str(slots.get(f"tile_{self.language}", value))
         if form == "lane":
             return self.lane(str(value))
         if form in _NAMED:
-            key = f"{_NAMED[form]}.{value}"
-            return self.sentences.get(key, str(value))
+            return self.sentences.get(f"{_NAMED[form]}.{value}", str(value))
+        # Python counts True as a number.
         if isinstance(value, bool) or not isinstance(value, int | float):
             return str(value)
         return self._measure(float(value), form)
@@ -158,9 +158,9 @@ class Sentences:
         return text if form else _trimmed(text)
 
     def _person(self, track: str) -> str:
-        found = _TRACK.fullmatch(track)
-        if found:
-            return self.say(f"class.track.{found[1]}", {"n": found[2]})
+        match = _TRACK.fullmatch(track)
+        if match:
+            return self.say(f"class.track.{match[1]}", {"n": match[2]})
         return self.sentences.get(f"class.{track}", track)
 
     def _sentence(self, value: object, slots: Slots) -> str:
@@ -191,17 +191,17 @@ def _flatten(blocks: Mapping[str, object], path: str = "") -> Iterator[tuple[str
 
 
 def writer(language: Language) -> Write:
-    """Writes messages in words: priority and time, but no place and no person."""
-    said = read_sentences(language)
+    """Writer of messages in a language: priority and time, no place and no person."""
+    sentences = read_sentences(language)
 
     def write(items: Sequence[AlertItem], is_escalated: bool) -> MessageText:
         slots = {
-            "priority": min(one.priority for one in items),
+            "priority": min(item.priority for item in items),
             "count": len(items),
-            "at": min(one.raised.wall for one in items),
+            "at": min(item.raised.wall for item in items),
         }
         title = "messages.title_unseen" if is_escalated else "messages.title"
         body = "messages.body_one" if len(items) == 1 else "messages.body_more"
-        return MessageText(said.say(title, slots), said.say(body, slots))
+        return MessageText(sentences.say(title, slots), sentences.say(body, slots))
 
     return write

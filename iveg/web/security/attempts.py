@@ -19,7 +19,7 @@ from iveg.web.security.rate_limits import Allowance
 
 SIGN_INS: Final = 5.0
 PER_S: Final = 1 / 60
-"""Wrong sign-ins that an address has at once, and that come back in a second."""
+"""Wrong sign-ins that an address has at once, and that come back each second."""
 REFUSED_ROWS: Final = 5.0
 """Rows of the audit a second for refused sign-ins, from all addresses together."""
 _MOST_ADDRESSES = 1024
@@ -30,8 +30,8 @@ class Attempts:
     """Counts wrong proofs of identity and records them.
 
     Args:
-        clock: Read at each of them.
-        trail: Told of sign-ins, and of those that were refused.
+        clock: Read at each attempt.
+        trail: Records sign-ins and refused sign-ins.
     """
 
     def __init__(self, clock: Clock, trail: AuditTrail) -> None:
@@ -43,8 +43,8 @@ class Attempts:
     def refuse_waiting(self, request: Request) -> None:
         """Refuse an address that has to wait. Raises HTTPException (429).
 
-        Before a password is checked: each check takes a while of a processor, and a
-        limit that the right password passes is none against guessing.
+        This comes before the check of a password, which takes processor time.  It also
+        refuses the right password: else guessing would have no limit.
         """
         allowance = self._wrong.get(client_of(request))
         wait_s = allowance.wait_s(self._clock().mono) if allowance else 0.0
@@ -53,15 +53,16 @@ class Attempts:
             raise HTTPException(429, detail, {"Retry-After": str(math.ceil(wait_s))})
 
     def refuse(self, request: Request) -> NoReturn:
-        """Count a proof that proves nothing, and refuse it.
+        """Count a wrong proof, and refuse it.
 
         Raises:
             HTTPException: always.
         """
+        # Requests that came together have all passed the first look.
         self.refuse_waiting(request)
         address, now = client_of(request), self._clock().mono
-        allowance = self._wrong.setdefault(address, Allowance(SIGN_INS, PER_S, now))
-        allowance.admit(now)
+        self._wrong.setdefault(address, Allowance(SIGN_INS, PER_S, now)).admit(now)
+        # Bounded memory: the address whose last wrong sign-in is oldest is forgotten.
         self._wrong.move_to_end(address)
         if len(self._wrong) > _MOST_ADDRESSES:
             self._wrong.popitem(last=False)
@@ -69,7 +70,7 @@ class Attempts:
         raise HTTPException(401, "This link does not sign in here, or not any more.")
 
     def note(self, actor: Actor, action: str, request: Request, **facts: str) -> None:
-        """Write a sign-in, or one that was refused, into the audit."""
+        """Write a sign-in, or its refusal, into the audit."""
         details = {"address": client_of(request), **facts}
         self._trail.note(actor, action, details=details, at=self._clock())
 

@@ -1,7 +1,7 @@
-"""Requests that change or export something, and their answers, read for the audit.
+"""Audit of requests that change or export something, from request and answer.
 
-Every route that changes something has a row here; a test walks the routes.  Of a body
-only the named keys are kept: the rest may be a password, or long.
+Every route that changes something has a row here; a test walks the routes.  Only the
+named keys of a body are kept: the rest may be a password, or long.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -28,15 +28,16 @@ class Audited:
 
     Attributes:
         action: Its word in the audit; empty: the route writes its rows itself.
-        asked: Members of the body that are kept; ``answered`` of the answer.
+        sent: Members of the request's body that are kept.
+        answered: Members of the answer that are kept.
     """
 
     action: str
-    asked: tuple[str, ...]
+    sent: tuple[str, ...]
     answered: tuple[str, ...]
 
 
-# Such a change leaves its row where it counts; here only refusals do.
+# The book of accounts writes rows of such changes itself; here only refusals do.
 _NOTED_BY_BOOK: Final = frozenset(
     {
         "account_added",
@@ -84,8 +85,8 @@ _ROWS: Final[Mapping[str, str]] = {
 
 def _read_row(row: str) -> Audited:
     before, _, after = row.partition(">")
-    action, *asked = before.split() or [""]
-    return Audited(action, tuple(asked), tuple(after.split()))
+    action, *sent = before.split() or [""]
+    return Audited(action, tuple(sent), tuple(after.split()))
 
 
 AUDITED: Final = {
@@ -99,18 +100,18 @@ _MOST_BYTES: Final = 16 * 1024
 _FILES: Final = frozenset(
     {"text/csv", "application/x-ndjson", "application/zip", "application/vnd.mcap"}
 )
-"""Answers that leave iVeg to be kept."""
+"""Media types of files that leave iVeg: sending one is an export."""
 READING: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 """Methods that change nothing."""
 
 
 class AuditRequests:
-    """Writes down what people and programs change and export.
+    """Records changes and exports of people and programs.
 
     Args:
-        identify: Who sends a request; None for a stranger.
+        identify: Finds the sender of a request; None for a stranger.
         trail: Takes the rows; never waits.
-        clock: Read at each of them.
+        clock: Read at each row.
     """
 
     def __init__(
@@ -131,14 +132,14 @@ class AuditRequests:
             await self._app(scope, receive, send)
             return
         reads = scope["method"] in READING
-        # Before it is served: a person who signs out is nobody afterwards.
+        # Before it is served: after a sign-out the caller would be unknown.
         who = None if reads else self._identify(HTTPConnection(scope))
-        asked, answered = bytearray(), bytearray()
+        sent, answered = bytearray(), bytearray()
         start: Message = {"status": 500, "headers": ()}
 
-        async def hear() -> Message:
+        async def receive_kept() -> Message:
             message = await receive()
-            asked.extend(message.get("body", b""))
+            sent.extend(message.get("body", b""))
             return message
 
         async def answer(message: Message) -> None:
@@ -149,23 +150,24 @@ class AuditRequests:
             await send(message)
 
         try:
-            await self._app(scope, receive if reads else hear, answer)
+            await self._app(scope, receive if reads else receive_kept, answer)
         finally:
+            # A failed route is on record, too: ``start`` has 500 by default.
             if reads:
                 self._write_export(scope, start)
             elif who is not None:
                 # Strangers change nothing; a sign-in writes its row itself.
-                self._write_change(who, scope, start["status"], asked, answered)
+                self._write_change(who, scope, start["status"], sent, answered)
 
     def _write_export(self, scope: Scope, start: Message) -> None:
         media_type = Headers(raw=start["headers"]).get("content-type", "")
         if start["status"] != 200 or media_type.partition(";")[0] not in _FILES:
             return
-        who = self._identify(HTTPConnection(scope))
-        if who is not None:
-            asked = {"query": scope["query_string"].decode("latin-1")[:1000]}
+        principal = self._identify(HTTPConnection(scope))
+        if principal is not None:
+            query = {"query": scope["query_string"].decode("latin-1")[:1000]}
             path = clean_text(scope["path"])
-            self._trail.note(who, "export", path, asked, at=self._clock())
+            self._trail.note(principal, "export", path, query, at=self._clock())
 
     def _write_change(
         self,
@@ -176,22 +178,22 @@ class AuditRequests:
         answer: bytearray,
     ) -> None:
         path: str = getattr(scope.get("route"), "path", "")
-        kept = AUDITED.get((scope["method"], path))
-        if kept is None or not kept.action:
+        row = AUDITED.get((scope["method"], path))
+        if row is None or not row.action:
             return
-        if kept.action in _NOTED_BY_BOOK and status < 400:
+        if row.action in _NOTED_BY_BOOK and status < 400:
             return
-        asked, answered = _named(body, kept.asked), _named(answer, kept.answered)
-        details = {"status": status, **asked, **answered}
+        sent, answered = _named(body, row.sent), _named(answer, row.answered)
+        details = {"status": status, **sent, **answered}
         subject = clean_text("".join(map(str, scope["path_params"].values())))
-        self._trail.note(who, kept.action, subject, details, at=self._clock())
+        self._trail.note(who, row.action, subject, details, at=self._clock())
 
 
 def _named(body: bytearray, names: Sequence[str]) -> dict[str, object]:
-    """Some members of a JSON object; none of what is no such object."""
-    read: object = None
+    """The named members of a JSON object; other values have none."""
+    document: object = None
     if names and len(body) <= _MOST_BYTES:
         with suppress(UnreadableError):
-            read = load_json(bytes(body))
-    known = read if isinstance(read, dict) else {}
+            document = load_json(bytes(body))
+    known = document if isinstance(document, dict) else {}
     return {name: all_legible(known[name]) for name in names if name in known}

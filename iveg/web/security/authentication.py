@@ -1,7 +1,7 @@
 """Authentication and authorisation of people and programs.
 
-People come with a session cookie, programs with a bearer token.  What a route asks of
-them is in ``requirements``::
+People come with a session cookie, programs with a bearer token.  ``requirements`` has
+the role that each route needs::
 
     link with token ──> session cookie ──> operator: read, stop, release, by name
     bearer token ─────────────────────────> program:  read, stop
@@ -10,7 +10,6 @@ them is in ``requirements``::
 STOP outlives the session (SECURITY.md): a person who was signed in once can still stop.
 """
 
-import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from urllib.parse import urlsplit
@@ -39,17 +38,15 @@ from iveg.web.security.sessions import Sessions
 NO_SESSION, FOREIGN_ORIGIN = 4401, 4403
 """Close codes of ``/live``."""
 
-_log = logging.getLogger(__name__)
-
 
 @dataclass(frozen=True, slots=True)
 class Credentials:
-    """Secrets of the environment that let in; an empty one lets nobody in.
+    """Secrets of the environment that give access; an empty secret gives none.
 
     Attributes:
         link: The sign-in link's token (hex); it signs a browser in as operator.
         api_token: The bearer token of programs.
-        link_name: Name of whoever holds the link.
+        link_name: Name of the person who signs in by the link.
     """
 
     link: str = field(repr=False)
@@ -61,9 +58,9 @@ class Authenticator:
     """Authenticates people and programs.
 
     Args:
-        credentials: Of the environment.
-        people: Those with accounts, and programs with tokens of their own.
-        trail: Told of sign-ins, and of those that were refused.
+        credentials: Secrets of the environment.
+        people: People with accounts, and programs with tokens of their own.
+        trail: Records sign-ins and refused sign-ins.
     """
 
     def __init__(
@@ -80,14 +77,16 @@ class Authenticator:
         """Exchange the token that a page has posted for a session cookie.
 
         Raises:
-            HTTPException: it is wrong, or there were too many wrong ones.
+            HTTPException: it is wrong, or too many were wrong.
             ForeignOriginError: another site's page sent it.
             NotJsonError: a body that is not JSON.
         """
         refuse_forgery(request)
-        # Somebody else's wrong links must not shut out whoever has the right one.
+        # No wait before the right link: wrong links of others behind the same address
+        # must not shut its holder out.
         if not same_secret(token, self._credentials.link):
             self.attempts.refuse(request)
+        # A browser has one session, and its cookie is about to be replaced.
         self._end_before(request)
         name = self._credentials.link_name
         cookie = self.sessions.open(name, "operator", LINK_PERSON)
@@ -99,7 +98,7 @@ class Authenticator:
         """Exchange a proof for a session cookie; raises as ``sign_in``.
 
         Args:
-            request: Brings it.
+            request: Request that brings the proof.
             proof: Finds the account that it proves; None where it is wrong.
 
         Raises:
@@ -117,10 +116,10 @@ class Authenticator:
         return self.admit(request, cookie, Response(status_code=204))
 
     def admit(self, request: Request, cookie: str, response: Response) -> Response:
-        """Give a browser its session; the audit has it."""
-        who = self.sessions.find(cookie)
-        if who is not None:
-            self.attempts.note(who, "sign_in", request)
+        """Give a browser its session, and note it in the audit."""
+        principal = self.sessions.find(cookie)
+        if principal is not None:
+            self.attempts.note(principal, "sign_in", request)
         secure = request.url.scheme == "https"
         response.set_cookie(
             session_cookie(secure=secure),
@@ -165,7 +164,7 @@ class Authenticator:
         return None if cookie is None else self.sessions.find(cookie)
 
     def authorise(self, request: Request, action: Action) -> Principal:
-        """Let a request in, or say why not.
+        """Authorise a request, and return its caller.
 
         Raises:
             NotSignedInError: a stranger.
@@ -178,9 +177,8 @@ class Authenticator:
             raise NotSignedInError
         if not principal.may(action):
             raise NotAllowedError(action, principal.role)
-        if principal.role == "expired" and action == "stop":
-            _log.info("STOP by %s, whose session is over", principal.name)
         if request.method not in READING:
+            # Only cookies are sent by browsers on behalf of other sites.
             if principal.session is None:
                 refuse_other_bodies(request)
             else:
@@ -219,8 +217,8 @@ class Authenticator:
 def refuse_forgery(request: Request) -> None:
     """Refuse a request without the two signs of our own page, or not as JSON.
 
-    Cookies come with anybody's request.  Browsers send Sec-Fetch-Site to trustworthy
-    addresses only, so over plain HTTP in a greenhouse Origin has to do.
+    Cookies come with the requests of any site.  Browsers send Sec-Fetch-Site to
+    trustworthy addresses only, so over plain HTTP in a greenhouse Origin must do.
 
     Raises:
         ForeignOriginError: one of them is missing or another site's.
@@ -254,7 +252,7 @@ def refuse_other_bodies(request: Request) -> None:
 
 
 def _is_own(origin: str | None, connection: HTTPConnection) -> bool:
-    """Whether a page of this very server sent it.
+    """Whether a page of this very server sent the request.
 
     Only host and port are compared: behind a proxy the scheme differs.
     """

@@ -1,7 +1,7 @@
 """Headers and the size limit in front of every route.
 
 Pure ASGI.  Notifications come hundreds of times a second and no browser reads their
-answers, so their path passes; their route has the same limit.
+answers, so their path passes untouched; their route has the same limit.
 """
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -22,7 +22,7 @@ CONTENT_SECURITY_POLICY = (
     "form-action 'self'; frame-ancestors 'none'; object-src 'none'; "
     "require-trusted-types-for 'script'"
 )
-"""One for every page: figures are drawn under it too (see ``charts.Library``)."""
+"""Policy of every page; figures are drawn under it, too."""
 
 _ALWAYS = (
     ("content-security-policy", CONTENT_SECURITY_POLICY),
@@ -67,8 +67,8 @@ class Bounds:
 def _guard(headers: MutableHeaders, scope: Scope) -> None:
     for name, value in _ALWAYS:
         headers.setdefault(name, value)
-    # Files are asked for again each time and mostly answered 304, so that a page
-    # never runs with yesterday's scripts; everything else is somebody's data.
+    # Files are checked at each load (mostly 304), so that a page never runs with
+    # yesterday's scripts; everything else is somebody's data.
     is_file = scope["path"].startswith("/static/")
     headers.setdefault("cache-control", "no-cache" if is_file else "no-store")
     if scope["scheme"] == "https":
@@ -76,13 +76,14 @@ def _guard(headers: MutableHeaders, scope: Scope) -> None:
 
 
 def _counted(receive: Receive) -> Receive:
-    taken = 0
+    size = 0
 
     async def receive_counted() -> Message:
-        nonlocal taken
+        nonlocal size
         message = await receive()
-        taken += len(message.get("body", b""))
-        if taken > MAX_BODY:
+        size += len(message.get("body", b""))
+        # A chunked body declares no length, so its bytes are counted.
+        if size > MAX_BODY:
             raise HTTPException(413, TOO_LONG)
         return message
 

@@ -1,4 +1,4 @@
-"""People with accounts, and programs with tokens of their own: known from memory."""
+"""People with accounts, and programs with tokens of their own, held in memory."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -23,14 +23,14 @@ _ROLES: Final[Mapping[TokenScope, Role]] = {
     "operate": "controller",
 }
 _USED_S = 60.0
-"""The last use of a token is known to so much (s)."""
+"""Precision of the last use of a token (s): each use would write the file."""
 
 
 class People:
-    """Knows who may sign in or call.
+    """People who may sign in, and programs that may call.
 
     Args:
-        book: Where they are known.
+        book: Has accounts and tokens.
         passwords: Checks passwords.
         clock: Read at each question.
     """
@@ -53,7 +53,7 @@ class People:
         )
 
     def admission(self, by: Actor) -> Admission:
-        """Changes accounts and tokens as somebody; each counts at once."""
+        """Changes of accounts and tokens in the name of ``by``; each counts at once."""
         return Admission(self.book, by, self.clock().wall)
 
     async def sign_in(self, name: str, password: str) -> Account | None:
@@ -62,17 +62,18 @@ class People:
         Raises:
             BusyError: too many sign in at once.
         """
-        found = find_named(self.known.values(), name)
-        fits = await self._passwords.fits(password, found.password if found else "")
-        if not found or not fits:
+        account = find_named(self.known.values(), name)
+        # Also without an account: the time must not reveal which names exist.
+        fits = await self._passwords.fits(password, account.password if account else "")
+        if not account or not fits:
             return None
-        # Whoever was changed meanwhile has proved an account that is none any more.
-        now = self.known.get(found.account_id)
-        is_same = now is not None and now.password == found.password
+        # The account may have been changed while the password was checked.
+        now = self.known.get(account.account_id)
+        is_same = now is not None and now.password == account.password
         return now if now and is_same and now.is_open(self.clock().wall) else None
 
     async def accept(self, invitation: str, password: str) -> Account | None:
-        """Begin an account by its invitation; None where that is none any more.
+        """Begin an account by its invitation; None where the invitation has ended.
 
         Raises:
             BusyError: too many sign in at once.
@@ -80,12 +81,13 @@ class People:
         digest = digest_of(invitation)
         if self._invited(digest) is None:
             return None
-        kept = await self._passwords.hashed(password)
+        hashed = await self._passwords.hashed(password)
+        # Again: somebody else may have used or ended it while the password was hashed.
         account = self._invited(digest)
         if account is None:
             return None
         now = self.clock().wall
-        begun = replace(account, password=kept, invitation="", since=now)
+        begun = replace(account, password=hashed, invitation="", since=now)
         self.book.put(begun)
         return begun
 
@@ -98,7 +100,7 @@ class People:
         return None
 
     async def change_password(self, who: Actor, old: str, new: str) -> Account | None:
-        """Give somebody a new password; None where the old one is wrong.
+        """Give a person a new password; None where the old password is wrong.
 
         Raises:
             BusyError: too many sign in at once.
@@ -107,14 +109,15 @@ class People:
         was = account.password if account else ""
         if not await self._passwords.fits(old, was):
             return None
-        kept = await self._passwords.hashed(new)
+        hashed = await self._passwords.hashed(new)
+        # Again: an admin may have reset or disabled it while the password was hashed.
         account = self.known.get(who.person)
         if account is None or account.password != was or account.disabled:
             return None
-        return self.admission(who).give_password(account, kept)
+        return self.admission(who).give_password(account, hashed)
 
     def program(self, token: str) -> Principal | None:
-        """The program whose token this is; None: nobody's, or nobody's any more."""
+        """The program of a token; None: unknown, or no longer valid."""
         known, now = self.book.tokens.get(digest_of(token)), self.clock().wall
         if known is None or not known.is_open(now):
             return None

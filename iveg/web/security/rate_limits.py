@@ -18,23 +18,23 @@ from iveg.web.problems import Problem
 from iveg.web.security.roles import Principal
 
 SIGN_INS_PER_S: Final = 20.0
-"""As many as one thread can compute."""
+"""Sign-ins that the thread of passwords can compute in a second."""
 MESSAGES_PER_S: Final = 300.0
-"""More than a page ever sends: it reports each frame that its screen shows."""
+"""More than a page ever sends: it reports each frame that its screen has shown."""
 SOCKETS: Final = 20
 TOO_MANY_SOCKETS: Final = 4429
-"""Close code of ``/live`` for one more than ``SOCKETS`` of the same owner."""
+"""Close code of ``/live`` beyond ``SOCKETS`` connections of an owner."""
 
 _LONGEST_STOP = 4096
-"""Bytes of a message that is looked at beyond the limit."""
+"""Longest message (bytes) that is still read for a STOP beyond the limit."""
 
 
 class Allowance:
     """A number of uses that fills again with time (a token bucket).
 
     Args:
-        most: How many uses may come at once.
-        per_s: How many come back in a second.
+        most: Uses that may come at once.
+        per_s: Uses that come back in a second.
         now: Monotonic time (s).
     """
 
@@ -44,23 +44,23 @@ class Allowance:
 
     def wait_s(self, now: float) -> float:
         """Time until one more is allowed (s); 0: it is allowed now."""
-        left = self._left + (now - self._at) * self._per_s
-        return max(0.0, (1.0 - left) / self._per_s)
+        uses_left = self._left + (now - self._at) * self._per_s
+        return max(0.0, (1.0 - uses_left) / self._per_s)
 
     def admit(self, now: float) -> bool:
-        """Use one up, where one is allowed; whether it was."""
+        """Take a use; returns whether it was allowed."""
         if self.wait_s(now) > 0.0:
             return False
-        left = self._left + (now - self._at) * self._per_s
-        self._left, self._at = min(self._most, left) - 1.0, now
+        uses_left = self._left + (now - self._at) * self._per_s
+        self._left, self._at = min(self._most, uses_left) - 1.0, now
         return True
 
 
 class SignInGate:
-    """Refuses (429) sign-ins beyond twenty a second before anything looks at them.
+    """Refuses (429) sign-ins beyond twenty a second before anything reads them.
 
-    A limit by address alone is none for an attacker who has many, and each request that
-    is looked at costs the loop on which a STOP runs some milliseconds.
+    An attacker with many addresses passes every limit by address.  Each request that is
+    read takes some milliseconds of the loop on which a STOP runs.
     """
 
     def __init__(self, app: ASGIApp, clock: Clock) -> None:
@@ -87,7 +87,7 @@ class SocketLimits:
     """At most twenty WebSockets of a session or program, and 300 messages a second.
 
     Args:
-        identify: The principal; strangers are left to authentication.
+        identify: Finds the principal; strangers are left to authentication.
         clock: Read at each message.
     """
 
@@ -100,16 +100,16 @@ class SocketLimits:
         self._app = app
         self._identify = identify
         self._clock = clock
-        self._open: Counter[bytes | str] = Counter()
+        self._open: Counter[str] = Counter()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
         is_socket = scope["type"] == "websocket"
-        who = self._identify(HTTPConnection(scope)) if is_socket else None
-        if who is None:
+        principal = self._identify(HTTPConnection(scope)) if is_socket else None
+        if principal is None:
             await self._app(scope, receive, send)
             return
-        owner = who.session or who.name
+        owner = principal.session or principal.name
         if self._open[owner] >= SOCKETS:
             await _refuse(scope, receive, send)
             return
@@ -118,6 +118,7 @@ class SocketLimits:
             await self._app(scope, self._limited(receive), send)
         finally:
             self._open[owner] -= 1
+            # Else every ended session would stay in the table.
             if not self._open[owner]:
                 del self._open[owner]
 
@@ -128,6 +129,7 @@ class SocketLimits:
         async def receive_limited() -> Message:
             while True:
                 message = await receive()
+                # Messages beyond the limit are dropped unread, but never a STOP.
                 if (
                     message["type"] != "websocket.receive"
                     or allowance.admit(self._clock().mono)

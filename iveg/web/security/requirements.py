@@ -1,15 +1,14 @@
-"""Role that each route asks of its caller, and its refusals in the OpenAPI document.
+"""Role that each route requires, and its refusals in the OpenAPI document.
 
-Every route declares its role with ``require``; ``declared_action`` reads it.  In the
-OpenAPI document any route may refuse with a problem (RFC 9457, ``web/problems.py``).
+Every route declares its role with ``require``, and a test walks them.  In the OpenAPI
+document any route may refuse with a problem (RFC 9457, ``web/problems.py``).
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
 from fastapi import Depends, FastAPI
-from fastapi.dependencies.models import Dependant
 from starlette.requests import HTTPConnection, Request
 from starlette.websockets import WebSocket
 
@@ -18,7 +17,7 @@ from iveg.web.security.roles import NOBODY, Action, Principal
 
 
 def authenticator_of(connection: HTTPConnection) -> Authenticator:
-    """The authenticator, which is put at ``app.state.authenticator``."""
+    """The authenticator of the application (``app.state.authenticator``)."""
     authenticator: Authenticator = connection.app.state.authenticator
     return authenticator
 
@@ -50,33 +49,11 @@ def require(action: Action) -> Requirement:
 STRANGERS: Final = [Depends(require("open"))]
 READERS: Final = [Depends(require("read"))]
 ADMINS: Final = [Depends(require("admin"))]
-"""Dependencies of routes that do not ask who it is."""
+"""Dependencies of routes that need a role but not the caller."""
 Reader = Annotated[Principal, Depends(require("read"))]
 Presser = Annotated[Principal, Depends(require("stop"))]
 Operator = Annotated[Principal, Depends(require("release"))]
 Admin = Annotated[Principal, Depends(require("admin"))]
-
-
-def declared_action(route: object) -> Action | None:
-    """The action that a route, or its FastAPI context, declares; None without one."""
-    dependant = getattr(route, "dependant", None)
-    if not isinstance(dependant, Dependant):
-        # A plain ASGI endpoint says it itself.
-        action: Action | None = getattr(
-            getattr(route, "endpoint", None), "action", None
-        )
-        return action
-    actions = [
-        call.action for call in _calls(dependant) if isinstance(call, Requirement)
-    ]
-    # A router's requirement comes before the route's own, which is stricter.
-    return actions[-1] if actions else None
-
-
-def _calls(dependant: Dependant) -> Iterator[object]:
-    for child in dependant.dependencies:
-        yield child.call
-        yield from _calls(child)
 
 
 # --- refusals in the OpenAPI document ----------------------------------------------

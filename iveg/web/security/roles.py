@@ -1,10 +1,10 @@
-"""Roles of people and programs, and what each may do (SECURITY.md)."""
+"""Roles of people and programs, and their rights (SECURITY.md)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from iveg.domain.accounts import OF_ACCOUNTS, SignInMethod
+from iveg.domain.accounts import ACCOUNT_METHODS, SignInMethod
 from iveg.domain.audit import Actor
 
 Role = Literal[
@@ -21,7 +21,7 @@ MAY: Final[Mapping[Role, frozenset[Action]]] = {
     "controller": frozenset({"open", "read", "stop", "release"}),
     "expired": frozenset({"open", "stop"}),
 }
-"""The table of SECURITY.md, "Roles"; what is not here is refused."""
+"""The table of SECURITY.md, "Roles"; any other action is refused."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,19 +29,19 @@ class Principal(Actor):
     """An authenticated person or program.
 
     Attributes:
-        session: Digest of the session that lets them in; None for programs.
-        signed_in_at: When (Unix s); None for programs, which do so at each request.
+        session: Digest of the session that lets them in (hex); None for programs.
+        signed_in_at: Time of the sign-in (Unix s); None for programs.
     """
 
     role: Role
     method: SignInMethod = "link"
-    session: bytes | None = None
+    session: str | None = None
     signed_in_at: float | None = None
 
     @property
     def has_account(self) -> bool:
-        """Whether it is a person by name, not whoever holds a link or a token."""
-        return self.method in OF_ACCOUNTS
+        """Whether it is a person with an account, not the holder of a link or token."""
+        return self.method in ACCOUNT_METHODS
 
     def may(self, action: Action) -> bool:
         """Whether the role's row holds this action."""
@@ -49,7 +49,7 @@ class Principal(Actor):
 
 
 NOBODY: Final = Principal("nobody", "expired")
-"""Unknown caller of an open route; never passed to a route that requires a role."""
+"""Unknown caller of an open route; routes that require a role never get it."""
 
 PROGRAM: Final = Principal("program", "program", "program", "token")
 """Any program with the one bearer token of the environment."""

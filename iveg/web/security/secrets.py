@@ -1,4 +1,4 @@
-"""Secrets that others send, compared in constant time."""
+"""Comparison of secrets that others send, in constant time."""
 
 import hmac
 

@@ -1,4 +1,4 @@
-"""Single sign-on: people whom an identity provider vouches for.
+"""Single sign-on by an identity provider that vouches for people.
 
 A browser goes to the provider and comes back with a code, which iVeg exchanges::
 
@@ -12,23 +12,21 @@ import asyncio
 import contextlib
 import re
 from collections.abc import AsyncIterator
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 
-from iveg.adapters.identity_provider import (
-    WAITS_S,
-    Attempt,
-    IdentityProvider,
-    SealedAttempts,
-)
-from iveg.domain.accounts import Account, ClaimReading
+from iveg.adapters.identity_provider import WAITS_S, Attempt, SealedAttempts
+from iveg.domain.accounts import ClaimReading
 from iveg.domain.audit import Actor
 from iveg.domain.errors import HopError, SignOnError
 from iveg.domain.wire import clean_text
 from iveg.web.security.authentication import Authenticator
 from iveg.web.security.secrets import same_secret
+
+if TYPE_CHECKING:
+    from iveg.adapters.oidc import OpenIdProvider
 
 CALLBACK: Final = "/signin/sso/callback"
 _MOST_TOGETHER = 8
@@ -40,13 +38,13 @@ class SingleSignOn:
 
     Args:
         provider: Vouches for them.
-        reading: Where name and role stand in what it says.
+        reading: Finds name and role in its claims.
         authenticator: Keeps their accounts and sessions.
     """
 
     def __init__(
         self,
-        provider: IdentityProvider,
+        provider: "OpenIdProvider",
         reading: ClaimReading,
         authenticator: Authenticator,
     ) -> None:
@@ -60,20 +58,17 @@ class SingleSignOn:
         """Send a browser to the provider.
 
         Args:
-            request: Of the browser.
-            to: Path of this server at which the person goes on; another is ``/``.
+            request: The browser's request.
+            to: Path of this server at which the person goes on; other text counts as
+                ``/``.
 
         Raises:
-            SignOnError: it cannot begin; the audit has it.
+            SignOnError: it cannot begin, which is noted in the audit.
         """
-        back = f"{str(request.base_url).rstrip('/')}{CALLBACK}"
-        attempt = Attempt(back, to if _OWN_PATH.fullmatch(to) else "/")
-        try:
-            async with self._asking():
-                address = await self._provider.address(attempt)
-        except SignOnError as error:
-            self._note_refused(request, error)
-            raise
+        return_url = f"{str(request.base_url).rstrip('/')}{CALLBACK}"
+        attempt = Attempt(return_url, to if _OWN_PATH.fullmatch(to) else "/")
+        async with self._asking(request):
+            address = await self._provider.address(attempt)
         response = RedirectResponse(address, 303)
         # Lax: the way back begins at the provider, where Strict cookies stay behind.
         response.set_cookie(
@@ -88,68 +83,56 @@ class SingleSignOn:
         return response
 
     async def finish(self, request: Request) -> tuple[str, str]:
-        """Take a browser in that comes from the provider.
+        """Sign in a browser that comes back from the provider.
 
         Returns:
             The token of the new session, and the path at which the person goes on.
 
         Raises:
-            SignOnError: it lets nobody in; the audit has it.
+            SignOnError: nobody is let in, which is noted in the audit.
         """
-        try:
-            attempt = self._attempt(request)
-            code = _code(request)
-            async with self._asking():
-                vouched = await self._provider.vouch(attempt, code)
-            issuer = self._provider.client.issuer
-            told = self._reading.read(issuer, vouched.subject, vouched.claims)
-            return self._open(told), attempt.to
-        except SignOnError as error:
-            self._note_refused(request, error)
-            raise
-
-    def _attempt(self, request: Request) -> Attempt:
-        """The attempt of this browser to which the answer belongs."""
-        sealed = request.cookies.get(_cookie(request), "")
-        state = request.query_params.get("state", "")
-        attempt = self._attempts.open(sealed, self._clock().wall)
-        if attempt is None or not same_secret(state, attempt.state):
-            raise SignOnError("outdated", "no sign-in of this browser waits for it")
-        return attempt
-
-    def _open(self, told: Account) -> str:
-        """Begin the session of a person who was vouched for; returns its token."""
-        by = Actor(told.name, told.role, told.account_id, "sso")
-        account = self._authenticator.people.admission(by).vouched(told)
-        return self._authenticator.sessions.open(
+        async with self._asking(request):
+            attempt, code = self._answer(request)
+            claims = await self._provider.vouch(attempt, code)
+            vouched = self._reading.read(claims["iss"], claims["sub"], claims)
+            actor = Actor(vouched.name, vouched.role, vouched.account_id, "sso")
+            account = self._authenticator.people.admission(actor).vouched(vouched)
+        token = self._authenticator.sessions.open(
             account.name, account.role, account.account_id, "sso"
         )
+        return token, attempt.to
+
+    def _answer(self, request: Request) -> tuple[Attempt, str]:
+        """The attempt of this browser that the provider answers, and its code."""
+        query = request.query_params
+        sealed = request.cookies.get(_cookie(request), "")
+        attempt = self._attempts.open(sealed, self._clock().wall)
+        if attempt is None or not same_secret(query.get("state", ""), attempt.state):
+            raise SignOnError("outdated", "no sign-in of this browser waits for it")
+        if "error" in query:
+            raise SignOnError("refused", clean_text(query["error"][:40]))
+        if not query.get("code"):
+            raise SignOnError("untrusted", "the answer holds no code")
+        return attempt, query["code"]
 
     @contextlib.asynccontextmanager
-    async def _asking(self) -> AsyncIterator[None]:
-        """Questions to the provider: of few people at a time, each bounded in time."""
-        if self._exchanges.locked():
-            raise SignOnError("busy", "too many sign in at once")
+    async def _asking(self, request: Request) -> AsyncIterator[None]:
+        """Questions to the provider, of few people at a time; failures are audited.
+
+        Raises:
+            SignOnError: nobody is let in.
+        """
         try:
+            # Refused, not queued: a provider that answers nothing takes 5 s a question.
+            if self._exchanges.locked():
+                raise SignOnError("busy", "too many sign in at once")
             async with self._exchanges:
                 yield
-        except HopError as error:
-            raise SignOnError("unreachable", error.detail) from error
-
-    def _note_refused(self, request: Request, error: SignOnError) -> None:
-        facts = {"by": "sso", "why": error.failure, "detail": error.detail}
-        self._authenticator.attempts.note_refused(request, **facts)
-
-
-def _code(request: Request) -> str:
-    """The code in an answer of the provider."""
-    query = request.query_params
-    if "error" in query:
-        raise SignOnError("refused", clean_text(query["error"][:40]))
-    code = query.get("code")
-    if not code:
-        raise SignOnError("untrusted", "the answer holds no code")
-    return code
+        except (HopError, SignOnError) as error:
+            reason = error.failure if isinstance(error, SignOnError) else "unreachable"
+            facts = {"by": "sso", "why": reason, "detail": error.detail}
+            self._authenticator.attempts.note_refused(request, **facts)
+            raise SignOnError(reason, error.detail) from error
 
 
 def _cookie(request: Request) -> str:

@@ -22,10 +22,10 @@ AGAIN_WITHIN_MS = 500.0
 
 
 WATCH = """() => {
-  window.told = [];
   const stop = document.querySelector('#stops [data-stop="AGI"]');
-  new MutationObserver(() => window.told.push([performance.now(), stop.dataset.state]))
-    .observe(stop, {attributeFilter: ['data-state']});
+  const tell = () => (window.told ??= []).push([performance.now(), stop.dataset.state]);
+  new MutationObserver(tell).observe(stop, {attributeFilter: ['data-state']});
+  tell();  // It may stand again already.
 }"""
 AGAIN = """() => {
   const free = performance.getEntriesByName('evaluated')[0].startTime;

@@ -3,7 +3,7 @@
 import pytest
 
 from iveg.adapters import dds_network
-from iveg.adapters.dds_network import DdsNetwork, used_of
+from iveg.adapters.dds_network import DdsNetwork, usable_interfaces
 
 MACHINE = {"lo": "127.0.0.1"} | {f"iveg{n}": f"192.0.2.{n + 1}" for n in range(4)}
 
@@ -14,7 +14,7 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_as_many_interfaces_as_cyclone_takes_are_used_and_loopback_last() -> None:
-    used = list(used_of(DdsNetwork().interfaces()))
+    used = list(usable_interfaces(DdsNetwork().interfaces()))
 
     assert used == ["iveg0", "iveg1", "iveg2", "lo"]
 

@@ -28,21 +28,18 @@ from tests.builders import (
 from tests.fakes.clock import FakeClock
 
 
-class Bench:
+class Bench(Ingest):
     """A reader, and all that it offers and rejects."""
 
     def __init__(self, scope: Scope = "all") -> None:
         self.offered: list[Received] = []
         self.rejected: list[tuple[str, str, str]] = []
         self.clock = FakeClock()
-        self.ingest = Ingest(World(("AGI",)), ignore, ignore)
-        self.reader = DirectReader("iveg", ["AGI"], self.clock, self, scope)
+        super().__init__(World(("AGI",)), ignore, ignore)
+        self.reader = DirectReader("iveg", ["AGI"], self.clock, self, scope, ignore)
 
     def read(self, topic: str, observation: Observation) -> None:
         self.reader.read(topic, codec.write_measure(observation))
-
-    def is_early(self, robot_id: str, kind: type[Observation], now: float) -> bool:
-        return self.ingest.is_early(robot_id, kind, now)
 
     def enqueue(self, received: Received) -> None:
         self.offered.append(received)

@@ -125,11 +125,11 @@ async def test_what_goes_on_is_found_by_its_last_row(
         alert_record(alert_id="A2", cleared_at=NOON + 2.0),
     )
 
-    found = await queries.open_commands()
+    found = await queries.left_open(lists.COMMANDS)
 
     assert [row.command_id for row in found] == ["R1", "S1", "S2"]
-    assert await queries.open_decisions() == (decision_record(),)
-    assert await queries.open_alerts() == (alert_record(),)
+    assert await queries.left_open(lists.DECISIONS) == (decision_record(),)
+    assert await queries.left_open(lists.ALERTS) == (alert_record(),)
 
 
 async def test_a_long_series_is_thinned_and_keeps_a_short_slow_down(

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from sqlalchemy import text
 
-from iveg.adapters import clock
 from iveg.adapters.history.engine import reading_engine, upgrade
 from iveg.adapters.history.recorder import Recorder
 from iveg.adapters.journal import FileJournal
@@ -59,7 +58,7 @@ async def recording(
 
 
 def state(recorder: Recorder) -> str:
-    return recorder.state(clock.now())
+    return recorder.state()
 
 
 def scalar(database_url: str, query: str) -> object:
@@ -167,12 +166,12 @@ async def test_what_a_crash_left_is_stored_at_the_next_start_and_never_again(
     old = path.read_bytes()
 
     async with recording(database_url, tmp_path) as recorder:
-        await asyncio.wait_for(recorder.caught_up(), PATIENCE_S)
+        await asyncio.wait_for(recorder.caught_up.wait(), PATIENCE_S)
         state_then = scalar(database_url, "SELECT state FROM commands")
         recorder.enqueue(command_record(state="STANDING"))
     path.write_bytes(old)
     async with recording(database_url, tmp_path) as recorder:
-        await asyncio.wait_for(recorder.caught_up(), PATIENCE_S)
+        await asyncio.wait_for(recorder.caught_up.wait(), PATIENCE_S)
 
     assert state_then == "REQUESTED"
     assert scalar(database_url, "SELECT state FROM commands") == "STANDING"
@@ -251,18 +250,19 @@ async def test_a_file_that_rots_while_in_use_is_moved_aside(
 
 
 async def test_what_waits_too_long_is_late(sqlite_url: str, tmp_path: Path) -> None:
+    moments = [Instant(at, NOON) for at in (100.0, 101.0, 103.0, 103.0)]
     recorder = Recorder(
         sqlite_url,
         FileJournal(tmp_path / "journal"),
-        read_clock=lambda: Instant(100.0, NOON),
+        read_clock=iter(moments).__next__,
     )
     recorder.enqueue(odometry_record())
 
-    states = [recorder.state(Instant(at, NOON)) for at in (101.0, 103.0)]
+    states = [recorder.state(), recorder.state()]
     await recorder.close()
 
     assert states == ["ok", "late"]
-    assert recorder.state(Instant(103.0, NOON)) == "ok"
+    assert recorder.state() == "ok"
 
 
 async def test_what_the_disk_did_not_take_waits_for_the_database(

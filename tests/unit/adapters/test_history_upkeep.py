@@ -34,7 +34,14 @@ class Upkeep:
         self.queries = Queries(url)
         self.space, self.recordings = ROOMY, 0
         supervision = self.desk.parts.core.supervision
-        self.disk = DiskWatch(directory, self._drop, supervision, lambda _: self.space)
+        self.is_paused = False
+        self.disk = DiskWatch(
+            directory,
+            self._drop,
+            lambda: self.is_paused,
+            supervision,
+            lambda _: self.space,
+        )
         self.part = HistoryUpkeep(
             self.recorder,
             self.queries,
@@ -62,11 +69,11 @@ class Upkeep:
         return [dict(one.slots) for one in kept if one.key == "log.history_kept"]
 
     def alerts(self) -> list[str]:
-        """Priorities of what is raised after the loop's next turn."""
+        """Alerts of the disk after the loop's next turn."""
         self.desk.loop.step([], self.desk.clock())
         waiting = self.desk.parts.evaluator.alerts.waiting
-        found = (one for one in waiting if one.condition.key == "alert.disk_low")
-        return [one.priority for one in found]
+        found = (one.condition for one in waiting if one.condition.subject == "disk")
+        return [f"{one.priority} {one.key}" for one in found]
 
 
 @pytest.fixture
@@ -119,10 +126,11 @@ async def test_a_low_disk_is_a_p2_and_takes_a_recording_at_each_look_and_no_row(
 ) -> None:
     found, kept.recordings = [], 5
     for space in (ROOMY, LOW, ALMOST, ROOMY):
-        kept.space = space
+        kept.space, kept.is_paused = space, space is ALMOST
         await kept.disk.look()
         kept.desk.clock.now += 1.0
         found.append(kept.alerts())
 
-    assert found == [[], ["P2"], ["P2"], []]
+    low, paused = "P2 alert.disk_low", "P3 alert.recordings_paused"
+    assert found == [[], [low], [low, paused], []]
     assert kept.part.counters == {"recordings_deleted": 2}

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import aiomqtt
 import pytest
 
-from iveg.adapters.iot_agent import IotAgentClient
-from iveg.adapters.orion import OrionClient
+from iveg.adapters.iot_agent import DEVICES, IotAgentClient
+from iveg.adapters.orion import REGISTRATIONS, OrionClient
 from iveg.adapters.reconciler import FiwareSite, Reconciled, provision
 from iveg.lab.embedded.context_broker import Registration
 from iveg.lab.embedded.entities import new_id
@@ -54,7 +54,9 @@ async def site() -> AsyncIterator[Site]:
 
 async def test_all_devices_are_made_and_the_command_device_last(site: Site) -> None:
     await site.provision("AGI")
-    made = [one["device_id"] for one in await site.agent.read_devices()]
+    made = [
+        one["device_id"] for one in await site.agent.read_all(DEVICES, part="devices")
+    ]
     robots = [one for one in made if one.startswith("AGI")]
     assert set(robots) == {"AGI" + device.suffix for device in names.ROBOT_DEVICES}
     assert set(made) - set(robots) == {"climate", "iveg-canary"}
@@ -63,10 +65,9 @@ async def test_all_devices_are_made_and_the_command_device_last(site: Site) -> N
 
 async def test_a_device_that_drifted_is_made_anew(site: Site) -> None:
     await site.provision("AGI")
-    await site.agent.delete_device("AGI_odom")
-    await site.agent.create_device(
-        {"device_id": "AGI_odom", "apikey": "iveg", "entity_name": "OTHER"}
-    )
+    await site.agent.delete(f"{DEVICES}/AGI_odom")
+    drifted = {"device_id": "AGI_odom", "apikey": "iveg", "entity_name": "OTHER"}
+    await site.agent.create(DEVICES, {"devices": [drifted]})
     mended = (await site.provision("AGI")).mended
     assert mended == ("Made anew device AGI_odom.", "Made anew device AGI.")
     assert (await site.provision("AGI")).mended == ()
@@ -74,8 +75,8 @@ async def test_a_device_that_drifted_is_made_anew(site: Site) -> None:
 
 async def unregister(site: Site) -> None:
     """As where the agent never told Orion of the command."""
-    (registration,) = await site.orion.read_registrations()
-    await site.orion.delete_registration(registration["id"])
+    (registration,) = await site.orion.read_all(REGISTRATIONS)
+    await site.orion.delete(f"{REGISTRATIONS}/{registration['id']}")
 
 
 async def shadow(site: Site) -> None:
@@ -87,10 +88,10 @@ async def shadow(site: Site) -> None:
 
 async def forget(site: Site) -> None:
     """An agent that lost its devices leaves its registration at Orion."""
-    old = Registration(
-        new_id(), TENANT[1], "AGI", "Robot", ("cmd",), "http://127.0.0.1:1"
-    )
-    await site.agent.delete_device("AGI")
+    entity = TENANT[1], "AGI", "Robot", ("cmd",)
+    agent = site.up.agent
+    old = Registration(new_id(), *entity, "http://127.0.0.1:1", agent.command)
+    await site.agent.delete(f"{DEVICES}/AGI")
     site.up.broker.tenant(TENANT[0]).registrations[old.id] = old
 
 
@@ -124,7 +125,7 @@ async def test_a_foreign_device_on_the_entity_is_told_and_left_alone(
         "entity_name": "AGI",
         "entity_type": "Robot",
     }
-    await site.agent.create_device(gps)
+    await site.agent.create(DEVICES, {"devices": [gps]})
     told = await site.provision("AGI")
     assert told.mended == ()
     assert told.problems[0].startswith("Device AAA_gps also feeds AGI")

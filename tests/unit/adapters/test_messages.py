@@ -9,7 +9,7 @@ from pathlib import Path
 import orjson
 import pytest
 
-from iveg.adapters.messages import AppriseSender, load_messages
+from iveg.adapters.messages import load_messages, send_message
 from iveg.domain.errors import DataFileError
 from iveg.domain.events import Address, AlertItem, MessagePlan, MessageText
 from iveg.web.pages.sentences import writer
@@ -58,7 +58,7 @@ async def standing(status: int = 200) -> AsyncIterator[Stand]:
 async def test_a_message_arrives_and_the_loop_goes_on_until_it_is_answered() -> None:
     async with standing() as stand:
         stand.is_open.clear()
-        sending = asyncio.create_task(AppriseSender().send(stand.address(), TEXT))
+        sending = asyncio.create_task(send_message(stand.address(), TEXT))
         await stand.came.wait()
         assert not sending.done()
         stand.is_open.set()
@@ -73,8 +73,8 @@ async def test_a_refusal_is_said_and_no_secret_logged(
 ) -> None:
     caplog.set_level(logging.DEBUG)
     async with standing(500) as stand:
-        assert await AppriseSender().send(stand.address(), TEXT) == "not taken"
-    assert await AppriseSender().send(stand.address(), TEXT) == "not taken"
+        assert await send_message(stand.address(), TEXT) == "not taken"
+    assert await send_message(stand.address(), TEXT) == "not taken"
 
     shown = "".join((caplog.text, *capfd.readouterr(), repr(stand.address())))
     assert "tomato" not in shown

@@ -94,17 +94,17 @@ async def test_of_what_is_offered_while_away_the_newest_of_each_topic_arrives() 
 
 
 async def test_connections_apart_come_and_go_together() -> None:
-    heard, lost, (port,) = list[str](), asyncio.Event(), free_ports(1)
+    heard, changes, (port,) = list[str](), list[bool](), free_ports(1)
     link = MqttLink(BrokerAddress("127.0.0.1", port), "test")
     apart = [{f"/{number}": 0} for number in range(5)]
-    link.attach({}, lambda topic, _: heard.append(topic), on_loss=lost.set, apart=apart)
+    link.attach({}, lambda topic, _: heard.append(topic), changes.append, apart=apart)
     async with running(link):
         async with mqtt_broker("127.0.0.1", port):
             await until(lambda: link.connected)
             for number in range(5):
                 link.enqueue(f"/{number}", b"")
             await until(lambda: len(heard) == 5)
-        await lost.wait()
+        await until(lambda: changes == [True, False])
 
 
 async def test_an_order_waits_for_no_confirmation_of_telemetry() -> None:

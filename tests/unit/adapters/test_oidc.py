@@ -7,9 +7,10 @@ from urllib.parse import parse_qs, urlsplit
 import pytest
 
 from iveg.adapters.fiware_http import TokenGrant
-from iveg.adapters.identity_provider import Attempt, Client, Vouched
+from iveg.adapters.identity_provider import Attempt, Client
 from iveg.adapters.oidc import OpenIdProvider
 from iveg.domain.errors import HopError, SignOnError
+from iveg.domain.records import Json
 from tests.fakes.identity_provider import (
     CLIENT,
     KEYCLOAK,
@@ -37,7 +38,7 @@ async def openid(provider: FakeIdentityProvider) -> AsyncIterator[OpenIdProvider
     await made.close()
 
 
-async def vouched(openid: OpenIdProvider, provider: FakeIdentityProvider) -> Vouched:
+async def vouched(openid: OpenIdProvider, provider: FakeIdentityProvider) -> Json:
     attempt = Attempt(BACK)
     back = provider.approve(await openid.address(attempt), "ana-1")
     return await openid.vouch(attempt, parse_qs(urlsplit(back).query)["code"][0])
@@ -52,8 +53,8 @@ async def test_a_person_is_vouched_for_by_a_signed_token(
 
     proof = await vouched(openid, provider)
 
-    assert proof.subject == "ana-1"
-    assert proof.claims["realm_access"] == KEYCLOAK["realm_access"]
+    assert proof["sub"] == "ana-1"
+    assert proof["realm_access"] == KEYCLOAK["realm_access"]
     # The client's secret is sent by the header that no log of forms keeps.
     assert "client_secret" not in provider.forms[0]
 
@@ -72,6 +73,23 @@ async def test_the_code_is_tied_to_the_browser_by_pkce(
     assert attempt.verifier not in address
 
 
+async def test_a_description_says_where_to_ask_and_sets_nothing_of_the_client(
+    openid: OpenIdProvider, provider: FakeIdentityProvider
+) -> None:
+    # Authlib would take all of it as settings.
+    provider.also = {
+        "code_challenge_method": None,
+        "id_token_signing_alg_values_supported": ["HS256"],
+        "jwks": {"keys": []},
+        "proxy": "http://127.0.0.1:1",
+        "token_endpoint_auth_method": "client_secret_post",
+    }
+
+    assert "code_challenge_method=S256" in await openid.address(Attempt(BACK))
+    assert (await vouched(openid, provider))["sub"] == "ana-1"
+    assert "client_secret" not in provider.forms[0]
+
+
 @pytest.mark.parametrize(
     ("vice", "why"),
     [
@@ -80,6 +98,7 @@ async def test_the_code_is_tied_to_the_browser_by_pkce(
         ("public_key_as_secret", "UnsupportedAlgorithmError"),
         ("foreign_key", "BadSignatureError"),
         ("no_token", "DecodeError"),
+        ("unsigned", "no ID token"),
     ],
 )
 async def test_a_token_that_nobody_else_signed_proves_nothing(
@@ -141,7 +160,7 @@ async def test_a_new_key_counts_at_once_and_one_that_is_gone_no_more(
     with pytest.raises(SignOnError, match="ID token: "):
         await vouched(openid, provider)
 
-    assert again.subject == "ana-1"
+    assert again["sub"] == "ana-1"
 
 
 async def test_user_info_adds_what_the_token_lacks_and_only_of_the_same_person(
@@ -152,8 +171,8 @@ async def test_user_info_adds_what_the_token_lacks_and_only_of_the_same_person(
     provider.vice = "other_user_info"
     other = await vouched(openid, provider)
 
-    assert told.claims["name"] == "Ana Núñez"
-    assert "name" not in other.claims
+    assert told["name"] == "Ana Núñez"
+    assert "name" not in other
 
 
 @pytest.mark.parametrize(
@@ -161,7 +180,9 @@ async def test_user_info_adds_what_the_token_lacks_and_only_of_the_same_person(
     [
         "wrong_issuer",
         "plain_http",
+        "endless_address",
         "huge /token",
+        "away /keys",
         "many_keys",
         "loop /userinfo",
         "away",
@@ -176,7 +197,7 @@ async def test_a_bad_provider_is_refused_in_bounded_time_and_memory(
 
     # A redirect is not followed: nothing of the user, but the token counts.
     if vice == "loop /userinfo":
-        assert (await vouched(openid, provider)).subject == "ana-1"
+        assert (await vouched(openid, provider))["sub"] == "ana-1"
     else:
         with pytest.raises((HopError, SignOnError)):
             await vouched(openid, provider)

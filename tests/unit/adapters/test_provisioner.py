@@ -28,8 +28,8 @@ SERVICE = ("agroconnect", "/greenhouse")
 
 
 async def first_ids(site: "Place") -> frozenset[str]:
-    await until(lambda: site.provisioner.subscription_ids)
-    return site.provisioner.subscription_ids
+    await until(lambda: site.own.ids)
+    return site.own.ids
 
 
 class HastyOrion(OrionClient):
@@ -82,6 +82,7 @@ class Place:
                 boot="boot",
             ),
         )
+        self.own = self.provisioner.subscriptions
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator["Place"]:
@@ -108,14 +109,14 @@ async def test_a_subscription_is_ours_as_soon_as_orion_uses_it(
 ) -> None:
     orion = HastyOrion(fiware.orion_url)
     site = Place(fiware, orion=orion)
-    orion.notify = site.provisioner.is_ours
-    assert site.provisioner.is_ours("of an earlier run, until the first are known")
+    orion.notify = site.own.is_ours
+    assert site.own.is_ours("of an earlier run, until the first are known")
     async with site.running():
         ids = await first_ids(site)
 
     assert orion.taken == [True] * len(wanted_for())
-    assert site.provisioner.is_ours(next(iter(ids)))
-    assert not site.provisioner.is_ours("somebody else's")
+    assert site.own.is_ours(next(iter(ids)))
+    assert not site.own.is_ours("somebody else's")
 
 
 async def test_the_secret_of_an_earlier_start_is_known_and_no_other(
@@ -125,19 +126,19 @@ async def test_the_secret_of_an_earlier_start_is_known_and_no_other(
         url = "http://127.0.0.1:9/ngsi/notifications"
         await ensure_subscriptions(orion, url, "cd" * 32, wanted_for())
     site = Place(fiware)
-    assert site.provisioner.is_former("any, before Orion has said which are ours")
+    assert site.own.is_former("any, before Orion has said which are ours")
     async with site.running():
         await first_ids(site)
 
-    assert site.provisioner.is_former("cd" * 32)
-    assert not site.provisioner.is_former("ef" * 32)
+    assert site.own.is_former("cd" * 32)
+    assert not site.own.is_former("ef" * 32)
 
 
 async def test_what_a_gap_has_lost_is_read_once_and_never_looks_live(
     fiware: Running,
 ) -> None:
     async with Place(fiware).running() as site:
-        await until(lambda: site.provisioner.subscription_ids)
+        await until(lambda: site.own.ids)
         measure = codec.write_measure(odometry())
         await site.link.publish("/iveg/AGI_odom/attrs", measure)
         read: list[Received] = []
@@ -147,7 +148,7 @@ async def test_what_a_gap_has_lost_is_read_once_and_never_looks_live(
                 drained = site.ingest.drain()
                 read = [one for one in drained if isinstance(one.observation, Odometry)]
 
-    assert all(one.asked for one in read)
+    assert all(one.is_query_answer for one in read)
     assert {one.transport for one in read} == {"fiware"}
 
 
@@ -164,7 +165,7 @@ async def test_an_agent_that_falls_behind_is_asked_nothing_more(
         behind = Place(fiware, agent_url=f"http://127.0.0.1:{port}")
         now = clock.now()
         for seq, (left, back) in enumerate(((-14.0, -12.0), (-8.0, 0.0))):
-            behind.health_monitor.sent(Origin("b", seq), now.later(left))
+            behind.health_monitor.probe.sent(Origin("b", seq), now.later(left))
             behind.health_monitor.received(Origin("b", seq), now.later(back))
         behind.health_monitor.received_at = now.mono
         async with behind.running() as site:

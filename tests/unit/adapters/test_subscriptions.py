@@ -7,7 +7,7 @@ import orjson
 import pytest
 
 from iveg.adapters.iot_agent import IotAgentClient
-from iveg.adapters.orion import OrionClient
+from iveg.adapters.orion import SUBSCRIPTIONS, OrionClient
 from iveg.adapters.reconciler import (
     PREFIX,
     TOKEN_HEADER,
@@ -33,7 +33,7 @@ class FakeStore(OrionClient):
         self.kept: dict[str, dict[str, Any]] = {}
         self.calls = 0
 
-    async def read_subscriptions(self) -> list[dict[str, Any]]:
+    async def read_all(self, *_: object, **__: object) -> list[dict[str, Any]]:
         return [{"id": key, **one} for key, one in self.kept.items()]
 
     async def create_subscription(self, document: Mapping[str, Any]) -> str:
@@ -42,15 +42,14 @@ class FakeStore(OrionClient):
         self.kept[subscription_id] = {"status": "active", **document}
         return subscription_id
 
-    async def update_subscription(
-        self, subscription_id: str, changes: Mapping[str, Any]
-    ) -> None:
+    async def ask(self, method: str, path: str, body: Any = None, **_: object) -> Any:
+        assert method == "PATCH"
         self.calls += 1
-        self.kept[subscription_id].update(changes)
+        self.kept[path.removeprefix(f"{SUBSCRIPTIONS}/")].update(body)
 
-    async def delete_subscription(self, subscription_id: str) -> None:
+    async def delete(self, path: str, *_: object, **__: object) -> None:
         self.calls += 1
-        del self.kept[subscription_id]
+        del self.kept[path.removeprefix(f"{SUBSCRIPTIONS}/")]
 
     def named(self, name: str) -> dict[str, Any]:
         return next(
@@ -68,7 +67,7 @@ async def test_twenty_restarts_make_no_second_one_and_change_nothing() -> None:
             again = await ensure_subscriptions(orion, URL, TOKEN, WANTED)
             assert again.ids == first.ids
             assert again.mended == ()
-        assert len(await orion.read_subscriptions()) == len(WANTED)
+        assert len(await orion.read_all(SUBSCRIPTIONS)) == len(WANTED)
 
 
 async def test_what_orion_is_told_is_what_it_needs() -> None:
@@ -171,7 +170,7 @@ async def test_an_update_is_one_request_for_each_subscription_that_is_about_it(
         await mqtt.publish("/iveg/climate/attrs", b'{"temperature": 21}', qos=1)
         async with asyncio.timeout(30):
             await heard.wait()
-        kept = await orion.read_subscriptions()
+        kept = await orion.read_all(SUBSCRIPTIONS)
 
     sent = {
         one["description"].removeprefix(PREFIX): one["notification"]["timesSent"]

@@ -8,11 +8,11 @@ WITHOUT = "import sys; sys.modules['iveg.lab'] = None; "
 SERVER = """
 import pathlib
 from fastapi.routing import iter_route_contexts
-from iveg.app.dss import Dss, open_dss
+from iveg.app import App
 from iveg.asgi import create_app
 from iveg.settings import Settings
-dss = open_dss(Settings(), pathlib.Path(sys.argv[1]))
-paths = [str(route.path) for route in iter_route_contexts(create_app(dss).routes)]
+app = App(Settings(), pathlib.Path(sys.argv[1]))
+paths = [str(route.path) for route in iter_route_contexts(create_app(app).routes)]
 print("/latency" in paths)
 """
 

@@ -1,11 +1,12 @@
 """A restart forgets no P1 that nobody saw."""
 
 import asyncio
-from typing import cast
+from typing import Any, cast
 
+from iveg.adapters.history.lists import ALERTS, COMMANDS, ListOf
 from iveg.adapters.history.queries import Queries
-from iveg.app.dss import remember
-from iveg.domain.alerts import read_alert
+from iveg.app import remember
+from iveg.domain.alerts import MOST_KEPT, read_alert
 from iveg.domain.errors import HopError
 from iveg.domain.records import AlertRecord
 from tests.builders import at
@@ -24,20 +25,16 @@ class LeftBehind:
         self._alerts = alerts
         self._silent_times = silent_times
 
-    async def open_commands(self) -> tuple[()]:
-        self._silent_times -= 1
+    async def left_open(self, listed: ListOf[Any]) -> tuple[AlertRecord, ...]:
+        if listed is ALERTS:
+            return tuple(one for one in self._alerts if one.cleared_at is None)
+        self._silent_times -= listed is COMMANDS
         if self._silent_times >= 0:
             raise HopError("database", "away")
         return ()
 
-    async def open_decisions(self) -> tuple[()]:
-        return ()
-
-    async def open_alerts(self) -> tuple[AlertRecord, ...]:
-        return tuple(one for one in self._alerts if one.cleared_at is None)
-
-    async def unseen_alerts(self, most: int) -> tuple[AlertRecord, ...]:
-        return self._alerts[:most]
+    async def unseen_alerts(self) -> tuple[AlertRecord, ...]:
+        return self._alerts[:MOST_KEPT]
 
 
 async def take_up(desk: Desk, left: LeftBehind) -> None:

@@ -11,7 +11,7 @@ from tests.unit.domain.scene import Scene
 
 ROOM = Rectangle(0, 0, 20, 20)
 OPEN_FIELD = Rectangle(-1e6, -1e6, 1e6, 1e6)
-PERSON = Zone("person", "P1", "AGI", 15.0, 15.0, 2.0, 2.0)
+PERSON = Zone("person", "P1", "AGI", 15.0, 15.0, 2.0)
 
 
 class Field(Scene):
@@ -39,7 +39,7 @@ class Field(Scene):
         return found
 
     def of(self, robot_id: str, *zones: Zone) -> InflatedGrid:
-        found = self.mapper.of(robot_id, zones, at(self.now))
+        found = self.mapper.of_robot(robot_id, zones, at(self.now))
         assert found is not None
         return found
 
@@ -63,7 +63,7 @@ def test_a_robot_believes_what_it_was_told_of_others_and_is_none_to_itself() -> 
     field = Field()
     field.sweep_from("AGI", 5.0)
     field.tick()
-    itself = Zone("robot", "AGI", "AGI", 12.0, 12.0, 2.0, 2.0)
+    itself = Zone("robot", "AGI", "AGI", 12.0, 12.0, 2.0)
 
     believed = field.of("AGI", PERSON, itself)
 
@@ -76,7 +76,7 @@ def test_whom_a_recording_saw_is_not_laid_over_today() -> None:
     field = Field()
     field.sweep_from("AGI", 5.0)
     field.tick()
-    recorded = Zone("person", "P1", "AGI", 15.0, 15.0, 2.0, 2.0, recording="D1")
+    recorded = Zone("person", "P1", "AGI", 15.0, 15.0, 2.0, recording="D1")
 
     assert not knows(field.shared(recorded), 15.0, 15.0)
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.detector import WordAnswer
 from iveg.domain.errors import OutdatedError, TrialRefusedError
 from iveg.domain.parameters import ByClass
 from iveg.domain.rule.trial import Trial
-from iveg.domain.words import WordAnswer
-from iveg.lab.emulator.orders import FaultOrder
 from iveg.pipeline import Pipeline
 from tests.builders import detection
+from tests.faulty_world import Faults
 from tests.stage import Stage
 from tests.unit.vital.desk import Desk
 from tests.unit.web.desk import WebDesk
@@ -39,15 +39,15 @@ async def test_the_rule_in_force_tried_beside_itself_makes_no_difference() -> No
     stage = Stage("demo", profile="field")
     await stage.step()
     begin(stage.parts, RULE, stage.desk)
-    for order in (
-        FaultOrder(robot="AGI", mute=True),
-        FaultOrder(robot="AGI", mute=False, clock_offset_s=3.0),
-        FaultOrder(robot="AGII", hide_people=True, deaf=True),
-        FaultOrder(robot="AGII", hide_people=False, deaf=False),
+    for robot_id, faults in (
+        ("AGI", Faults(mute=True)),
+        ("AGI", Faults(clock_offset_s=3.0)),
+        ("AGII", Faults(hide_people=True, deaf=True)),
+        ("AGII", Faults()),
     ):
         for _ in range(400):
             await stage.step()
-        stage.happen(order)
+        stage.happen(robot_id, faults)
 
     trial = trial_of(stage.desk)
     told = trial.so_far

@@ -82,7 +82,7 @@ class Bench:
     ) -> list[Effect]:
         number = next(self._answers) if seq is None else seq
         named = self.machine.hold_id if id is None else id
-        if attempt is None and result != "LATCHED" and self.machine.once is not None:
+        if attempt is None and result != "LATCHED" and self.machine.order is not None:
             attempt = self.attempt
         origin = Origin("b1", number)
         answer = CommandAnswer("AGI", origin, named, result, why=why, attempt=attempt)
@@ -131,8 +131,8 @@ class Bench:
     @property
     def once(self) -> FollowedCommand:
         """The release or resume under way."""
-        assert self.machine.once is not None
-        return self.machine.once
+        assert self.machine.order is not None
+        return self.machine.order
 
     @property
     def attempt(self) -> str:

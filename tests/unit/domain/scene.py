@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.detector import flaw_of
+from iveg.domain.detector import JudgedFrame, judge_frame
 from iveg.domain.feedback import SpeedLimit
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
@@ -18,8 +18,8 @@ from iveg.domain.observations import (
 from iveg.domain.rule.judge import SpeedLimits
 from iveg.domain.rule.zones import LimitChange
 from iveg.domain.tracking.people import People, Placed
-from iveg.domain.tracking.person import TrackedPerson
 from iveg.domain.tracking.sight import BlindCameras, Look, OwnSight
+from iveg.domain.tracking.tracker import TrackedPerson
 from iveg.domain.world import World
 from tests.builders import (
     at,
@@ -98,19 +98,27 @@ class Scene:
         """A frame comes in."""
         self._apply(received(frame, after=self.now))
         placed, robot = self.sight(frame), self.world.robot(frame.robot_id)
-        if flaw_of(frame, self.rule, self.people.turned_away):
+        judged = self.judge_frame(frame)
+        if robot.detector.take_frame(judged, self.people.turned_away, 0, has_pose=True):
             robot.detector.note_flaw("unreadable", at(self.now))
         else:
             robot.detector.note_whole(robot.detections_at)
-        look = Look.of_frame(robot, frame, placed, at(self.now))
+        look = Look.from_frame(robot, frame, placed, at(self.now))
         self.blind.take(look, self.people, self.world)
         self.ended += self.own_sight.take(look, self.people)
         return placed
 
     def sight(self, frame: DetectionFrame) -> list[Placed]:
         return self.people.sight(
-            frame, self.world, self.rule, at(self.now), f"look{self._seq}"
+            self.judge_frame(frame),
+            self.world.robot(frame.robot_id),
+            self.world,
+            at(self.now),
+            f"look{self._seq}",
         )
+
+    def judge_frame(self, frame: DetectionFrame) -> JudgedFrame:
+        return judge_frame(frame, self.rule, (), self.world.word_answers)
 
     def walks_by(
         self, robot_id: str, x: float, y: float = 0.0, *, moved: bool = True
@@ -121,7 +129,7 @@ class Scene:
         said = safety_report(robot_id, speed_factor=0.5, reason="obstacle")
         said = replace(said, obstacle=seen, origin=self._origin())
         self._apply(received(said, after=self.now))
-        return self.people.witness(said, at(self.now), f"laser{self._seq}")
+        return self.people.track_obstacle(said, at(self.now), f"laser{self._seq}")
 
     def navigate(
         self, robot_id: str, task: str, path: tuple[tuple[float, float], ...] = ()

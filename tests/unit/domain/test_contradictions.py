@@ -8,7 +8,7 @@ import pytest
 from iveg.domain.geometry import Rectangle
 from iveg.domain.observations import FeedbackRef, Observation, Origin, Received
 from iveg.domain.robot_state import Doubts
-from iveg.domain.transports import DIRECT, FIWARE
+from iveg.domain.transports import DIRECT
 from iveg.domain.world import World
 from tests.builders import at, fleet_of, odometry, origin, safety_report
 
@@ -189,7 +189,7 @@ def test_orions_answer_to_a_question_contradicts_nothing() -> None:
     for _ in range(20):
         robot.wait(STEP_S)
         said = odometry(x=1e4, linear=50.0, origin=robot.origin())
-        robot.world.apply(Received(said, at(robot.now), FIWARE.id, asked=True))
+        robot.world.apply(Received(said, at(robot.now), is_query_answer=True))
 
     assert robot.doubts == ()
 

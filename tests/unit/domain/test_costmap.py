@@ -21,7 +21,7 @@ ROOM = Grid.over(Rectangle(0, 0, 20, 10))
 
 
 def ring(x: float, y: float, radius_m: float) -> Zone:
-    return Zone("person", "P1", "AGI", x, y, radius_m, radius_m)
+    return Zone("person", "P1", "AGI", x, y, radius_m)
 
 
 def around(distance: float, beams: int = 720, range_max: float = 12.0) -> LaserScan:

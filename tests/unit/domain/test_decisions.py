@@ -10,7 +10,7 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.observations import FeedbackRef
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.zones import Zone, ZoneEntry
-from iveg.domain.tracking.person import Sighting
+from iveg.domain.tracking.tracker import Sighting
 from iveg.domain.transports import DIRECT
 from iveg.domain.world import World
 from tests.builders import START, at, odometry, origin, received, safety_report
@@ -19,9 +19,9 @@ LOOK = Sighting("AGI", 1.0, 0.0, 0.9, START, "farmer", 0.94)
 
 
 def entry(sighting: Sighting | None = LOOK) -> ZoneEntry:
-    zone = Zone("person", "P1", "AGI", 1.0, 0.0, 2.0, 2.0, sighting)
+    zone = Zone("person", "P1", "AGI", 1.0, 0.0, 2.0, sighting)
     if sighting is None:
-        zone = Zone("robot", "AGI", "AGI", 1.0, 0.0, 2.0, 2.0)
+        zone = Zone("robot", "AGI", "AGI", 1.0, 0.0, 2.0)
     return ZoneEntry(
         "d-1",
         "AGII",
@@ -34,22 +34,26 @@ def entry(sighting: Sighting | None = LOOK) -> ZoneEntry:
     )
 
 
-def decision(sighting: Sighting | None = LOOK) -> SlowdownDecision:
-    return SlowdownDecision(entry(sighting), DetectionRule())
+def begun() -> Decisions:
+    book = Decisions()
+    book.begin(entry(), DetectionRule())
+    return book
 
 
-def obeyed(one: SlowdownDecision, after: float = 0.2) -> SlowdownDecision:
-    slow = safety_report("AGII", speed_factor=0.5, reason="person")
-    return one.published(at(0.01)).reported(slow, at(after)).slowed(0.4, at(after))
+def obeyed(after: float = 0.2) -> SlowdownDecision:
+    book = begun()
+    book.published(at(0.01))
+    book.reported(safety_report("AGII", speed_factor=0.5, reason="person"), at(after))
+    (one,) = book.moved("AGII", 0.4, at(after), is_slow=True)
+    return one
 
 
-def verdicts(one: SlowdownDecision, after: float) -> dict[str, str]:
-    """Of a robot that has been heard all the time (s)."""
-    return {link.name: link.verdict for link in one.aged(after).links()}
+def verdicts(one: SlowdownDecision) -> dict[str, str]:
+    return {link.name: link.verdict for link in one.links()}
 
 
 def test_every_link_has_its_time_and_value() -> None:
-    links = {link.name: link for link in obeyed(decision()).links()}
+    links = {link.name: link for link in obeyed().links()}
 
     assert links["detection"].value == "farmer"
     assert links["filter"].value == 0.94
@@ -61,23 +65,25 @@ def test_every_link_has_its_time_and_value() -> None:
 
 
 def test_what_did_not_come_in_time_or_until_the_end_is_missing() -> None:
-    one = decision().reported(safety_report("AGII", speed_factor=1.0), at(0.1))
+    book = begun()
 
-    assert one.aged(1.9) is one
-    aged = one.aged(2.0)
+    assert book.reported(safety_report("AGII", speed_factor=1.0), at(0.1)) == []
+    assert book.age(lambda _: 1.9) == []
+    (aged,) = book.age(lambda _: 2.0)
     assert aged.waited_out
-    assert aged.aged(9.0) is aged
-    assert verdicts(aged, 2.0)["applied"] == "missing"
-    assert verdicts(one.closed(at(0.5)), 0.6)["applied"] == "missing"
+    assert book.age(lambda _: 9.0) == []
+    assert verdicts(aged)["applied"] == "missing"
+    (ended,) = begun().end("d-1", at(0.5))
+    assert verdicts(ended)["applied"] == "missing"
 
 
 @pytest.mark.parametrize(("after", "verdict"), [(1.0, "ok"), (1.01, "late")])
 def test_a_link_after_a_second_is_late(after: float, verdict: str) -> None:
-    assert verdicts(obeyed(decision(), after), 3.0)["applied"] == verdict
+    assert verdicts(obeyed(after))["applied"] == verdict
 
 
 def test_a_peers_own_odometry_needs_no_detection() -> None:
-    found = verdicts(decision(sighting=None), 0.0)
+    found = verdicts(Decisions().begin(entry(sighting=None), DetectionRule()))
 
     assert (found["detection"], found["filter"]) == ("n/a", "n/a")
 
@@ -132,8 +138,7 @@ def test_the_clock_of_a_robot_that_echoes_is_not_blamed_for_a_late_transport(
 
 
 def test_what_a_robot_does_changes_its_own_open_decisions_once() -> None:
-    book = Decisions()
-    book.begin(entry(), DetectionRule())
+    book = begun()
 
     assert book.moved("AGI", 0.1, at(1), is_slow=True) == []
     assert book.moved("AGII", 0.9, at(1), is_slow=False) == []
@@ -156,12 +161,12 @@ def test_old_ended_decisions_make_room_and_open_ones_never_do() -> None:
 
 
 def test_what_was_open_when_iveg_went_away_is_unknown_and_says_when() -> None:
-    broken = decision().published(at(0.01)).closed(at(0.5), interrupted=True)
+    book = begun()
+    book.published(at(0.01))
+    (broken,) = book.break_off(at(0.5))
 
-    assert verdicts(broken, 99.0)["feedback"] == "ok"
+    found = verdicts(broken)
+    assert found["feedback"] == "ok"
     assert broken.links()[-1].at == at(0.5).wall
-    assert {name: verdicts(broken, 0.5)[name] for name in ("applied", "observed")} == {
-        "applied": "unknown",
-        "observed": "unknown",
-    }
-    assert verdicts(broken, 0.5)["interrupted"] == "unknown"
+    assert (found["applied"], found["observed"]) == ("unknown", "unknown")
+    assert found["interrupted"] == "unknown"

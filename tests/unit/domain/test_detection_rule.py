@@ -53,7 +53,7 @@ def test_the_strictest_rule_slows_wherever_one_of_them_would(
     alerts = [rule.judge(word, confidence).kind == "alert" for rule in rules]
     assert strict.judge(word, confidence).kind == "alert" or not any(alerts)
     for rule in rules:
-        assert strict.radius_m.of(None) >= max(rule.radius_m.values)
+        assert strict.radius_m.for_class(None) >= max(rule.radius_m.values)
         assert strict.foresight >= rule.foresight
         assert strict.foresight_s >= rule.foresight_s
     assert strict.possible_people

@@ -3,7 +3,13 @@
 import pytest
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.detector import FRAMES_HZ, DetectorEvidence, OutOfService, flaw_of
+from iveg.domain.detector import (
+    FRAMES_HZ,
+    DetectorEvidence,
+    OutOfService,
+    WordAnswers,
+    judge_frame,
+)
 from iveg.domain.observations import DetectionFrame, Origin
 from tests.builders import at
 
@@ -76,6 +82,7 @@ def test_a_frame_with_a_box_that_may_be_somebody_and_has_no_place_is_not_whole(
 ) -> None:
     frame = DetectionFrame("AGI", Origin(), (), unread)
 
-    found = flaw_of(frame, DetectionRule(), unplaced=unplaced, has_pose=has_pose)
+    judged = judge_frame(frame, DetectionRule(), (), WordAnswers())
+    found = DetectorEvidence().take_frame(judged, 0, unplaced, has_pose=has_pose)
 
     assert found == flaw

@@ -75,11 +75,11 @@ def test_an_unanswered_goal_is_not_confirmed_and_a_late_word_still_counts() -> N
 
 
 def test_a_cancellation_waits_for_its_own_answer() -> None:
-    asked = goal_in("DRIVING").after("cancel", at(30))
+    cancelling = goal_in("DRIVING").after("cancel", at(30))
 
-    assert (asked.state, asked.asked) == ("CANCELLING", at(30))
-    assert not asked.is_overdue(at(35))
-    assert asked.after("expired", at(41)).state == "UNCONFIRMED"
+    assert (cancelling.state, cancelling.ordered) == ("CANCELLING", at(30))
+    assert not cancelling.is_overdue(at(35))
+    assert cancelling.after("expired", at(41)).state == "UNCONFIRMED"
 
 
 # --- places -----------------------------------------------------------------------

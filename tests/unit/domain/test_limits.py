@@ -21,16 +21,15 @@ RINGS = json.loads((ROOT / "tests/data/rings.json").read_text())
 def test_the_ring_law_gives_the_shared_cases(case: dict[str, float]) -> None:
     rule = DetectionRule(radius_m=ByClass(case["radius_m"]))
 
-    assert grown_radius(rule.radius_m.of("person"), case["age_s"]) == pytest.approx(
-        case["ring_m"], abs=1e-6
-    )
+    radius_m = grown_radius(rule.radius_m.for_class("person"), case["age_s"])
+    assert radius_m == pytest.approx(case["ring_m"], abs=1e-6)
 
 
 def test_rule_robot_and_settings_begin_with_the_limits() -> None:
     settings, robot = Settings(), Limits()
 
     assert settings.rule.radius_m == ByClass(LIMITS.zone_default_m)
-    assert DetectionRule.of(settings.rule) == DetectionRule()
+    assert DetectionRule.from_parameters(settings.rule) == DetectionRule()
     assert settings.feedback_stand_s == robot.stand_s == LIMITS.feedback_stand_s
     assert settings.feedback_slow_s == robot.slow_s == LIMITS.feedback_slow_s
 

@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from iveg.domain.alerts import of_ignored
+from iveg.domain.alerts import of_ignored_limit
 from iveg.domain.feedback import CLEAR, HALF_SPEED, SpeedLimit
 from iveg.domain.robot_state import Obedience, allowed_s
 from iveg.domain.world import World
 from tests.builders import AGI, at, fleet_of, odometry, origin, received, safety_report
 
 PERSON = SpeedLimit(HALF_SPEED, "person", "P1", 1.2, "d-1")
-STALE = SpeedLimit(HALF_SPEED, "stale", "AGI")
 STEP_S = 0.1
 
 
@@ -47,7 +46,7 @@ class Watched:
                 self.world.apply(received(report, after=self.now))
             robot = self.world.robot("AGI")
             ignored = self.obedience.ignored(robot, at(self.now))
-            found += [one.key for one in of_ignored("AGI", ignored)]
+            found += [one.key for one in of_ignored_limit("AGI", ignored)]
         return found
 
 

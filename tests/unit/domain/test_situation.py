@@ -8,18 +8,18 @@ import pytest
 from iveg.domain.events import Condition
 from iveg.domain.feedback import SpeedLimit
 from iveg.domain.rule.clear import ClearCondition
-from iveg.domain.situation import ALERTED, ORDER, Near, situation_of, told_of
+from iveg.domain.situation import ALERTED, ORDER, Near, situation_alerts, situation_of
 from tests.builders import safety_report
 from tests.staged import AISLE_3, HALF, TOLD, facts, p1
 
 
 def alerts(*keys: str) -> list[Condition]:
     """These hold at once, raised in another order than they are told."""
-    return told_of(one for key in reversed(keys) for one in p1(f"alert.{key}"))
+    return situation_alerts(one for key in reversed(keys) for one in p1(f"alert.{key}"))
 
 
 LASER = Near("obstacle", None, 0.9)
-PERSON = {"report": HALF, "limit": TOLD, "near": AISLE_3, "told_near": AISLE_3}
+PERSON = {"report": HALF, "limit": TOLD, "near": AISLE_3, "limit_near": AISLE_3}
 OBSTACLE = {
     "report": safety_report("AGI", speed_factor=0.5, reason="obstacle"),
     "near": LASER,

@@ -179,14 +179,10 @@ def test_i7_a_release_without_the_robots_word_becomes_a_stop_under_a_new_id() ->
     assert bench.machine.wants_stop
     assert bench.ours.id != old
     assert len(sends(effects, "direct")) == 1
-    ended = [one.command for one in effects if isinstance(one, Closed)]
-    assert {one.kind: one.state for one in ended} == {
-        "release": "EXPIRED",
-        "stop": "REPLACED",
-    }
-    assert {one.key for one in effects if isinstance(one, Closed)} == {
-        "release_unconfirmed"
-    }
+    ended = [one for one in effects if isinstance(one, Closed)]
+    states = {one.command.kind: one.command.state for one in ended}
+    assert states == {"release": "EXPIRED", "stop": "REPLACED"}
+    assert {one.key for one in ended} == {"release_unconfirmed"}
 
 
 def test_a_held_robot_that_iveg_did_not_stop_can_be_released() -> None:

@@ -6,8 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.tracking.person import Sighting
-from iveg.domain.tracking.tracker import PlacedDetection, Tracker, TrackNumbers, assign
+from iveg.domain.tracking.tracker import (
+    PlacedDetection,
+    Sighting,
+    Tracker,
+    TrackNumbers,
+    assign,
+)
 from tests.builders import START, at
 from tests.unit.domain.scene import Scene, person
 

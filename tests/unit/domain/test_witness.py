@@ -28,7 +28,9 @@ class Beside:
 
     def __init__(self, plan: Greenhouse | None = ROOM, room: Greenhouse = ROOM) -> None:
         self.room = room
-        self.witness = Witness(BODY, None if plan is None else Plan.of(plan))
+        self.witness = Witness(
+            BODY, None if plan is None else Plan.from_greenhouse(plan)
+        )
         self.now = 0.0
         self.peers_stand = True
         self.rng = np.random.default_rng(1)
@@ -47,7 +49,7 @@ class Beside:
         ranges = sweep(
             pose,
             MODEL,
-            Scenery.of(self.room, leaves),
+            Scenery.from_greenhouse(self.room, leaves),
             [Disc(x, y, 0.25) for x, y in people],
             [Body("P", one, 1.0, 0.7) for one in peers],
             self.rng,

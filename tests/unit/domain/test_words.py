@@ -2,9 +2,10 @@
 
 import pytest
 
-from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.detection_rule import DetectionRule, Meaning, meaning_of, plain
+from iveg.domain.detector import name_numbers, read_classes
 from iveg.domain.errors import UnreadableError
-from iveg.domain.words import Meaning, meaning_of, name_numbers, plain, read_classes
+from iveg.domain.parameters import Class
 from tests.builders import detection, detection_frame
 
 
@@ -36,8 +37,11 @@ def test_other_words_mean_what_they_say(word: str, meaning: Meaning | None) -> N
     assert meaning_of(word) == meaning
 
 
-def test_no_table_of_a_rule_takes_a_persons_word_away() -> None:
-    assert DetectionRule(aliases={}).class_of("farmer") == "person"
+@pytest.mark.parametrize("aliases", [{}, {"farmer": "robot", "farmer_2": "robot"}])
+def test_no_table_of_a_rule_takes_a_persons_word_away(
+    aliases: dict[str, Class],
+) -> None:
+    assert DetectionRule(aliases=aliases).class_of("Farmer_2") == "person"
 
 
 @pytest.mark.parametrize(

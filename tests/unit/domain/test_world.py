@@ -45,7 +45,7 @@ def world_with(*observations: Observation) -> World:
 
 
 def asked(observation: Observation, after: float = 0.0) -> Received:
-    return replace(received(observation, after=after), asked=True)
+    return replace(received(observation, after=after), is_query_answer=True)
 
 
 # --- links ------------------------------------------------------------------------
@@ -253,7 +253,6 @@ def test_what_was_asked_of_orion_never_looks_live() -> None:
     robot = world.robot("AGI")
     assert robot.link(at(0.0)) == "LOST"
     assert robot.odometry is not None
-    assert robot.heard_at is None
     assert robot.clock.offset_s(at(0.0)) is None
     for heard in (robot.safety_received, robot.scan_received):
         assert heard is not None
@@ -271,10 +270,10 @@ def test_what_was_asked_does_not_disturb_a_robot_without_identity() -> None:
     world = World(["AGI"])
     world.apply(received(odometry(x=1.0, origin=Origin())))
 
-    verdict = world.apply(asked(odometry(x=2.0, origin=Origin())))
+    freshness = world.apply(asked(odometry(x=2.0, origin=Origin())))
 
     robot = world.robot("AGI")
-    assert verdict == "duplicate"
+    assert freshness == "duplicate"
     assert robot.odometry is not None
     assert robot.odometry.pose.x == 1.0
     assert robot.link(at(0.0)) == "LIVE"
@@ -285,9 +284,9 @@ def test_an_answer_displaces_no_live_robot() -> None:
     world.apply(received(odometry(x=1.0, origin=origin(1, boot="today"))))
 
     kept = asked(odometry(x=9.0, origin=origin(900, boot="yesterday")), after=0.1)
-    assert world.apply(kept) == "late"
+    assert world.apply(kept) == "duplicate"
     newer = asked(odometry(x=2.0, origin=origin(2, boot="today")), after=0.1)
-    assert world.apply(newer) == "new"
+    assert world.apply(newer) == "stored"
 
     robot = world.robot("AGI")
     assert robot.odometry is not None

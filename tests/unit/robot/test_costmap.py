@@ -45,7 +45,7 @@ def costmap() -> FleetCostmap:
 
 
 def hear(one: FleetCostmap, said: bytes, own: Pose2D = HERE) -> None:
-    one.hear(TOPIC, said, own, START.wall)
+    one.receive(TOPIC, said, own, START.wall)
 
 
 def drawn(
@@ -128,6 +128,6 @@ def test_a_bad_scan_is_ignored_and_logged_once(
 
 def test_a_clock_of_iveg_that_is_set_is_followed() -> None:
     one = costmap()
-    one.hear(TOPIC, payload(after=900.0), HERE, START.wall + 900)
+    one.receive(TOPIC, payload(after=900.0), HERE, START.wall + 900)
 
     assert len(one.drain_scans()) == 1

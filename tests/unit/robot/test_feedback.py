@@ -27,9 +27,9 @@ def test_a_repeated_number_does_not_make_it_younger_nor_an_older_one_older() -> 
     watchdog = Watchdog(0.0, 1.0)
     watchdog.sent(7, 10.0)
     watchdog.sent(8, 10.5)
-    watchdog.heard(8, 10.6)
-    watchdog.heard(8, 12.0)
-    watchdog.heard(7, 12.1)
+    watchdog.received(8, 10.6)
+    watchdog.received(8, 12.0)
+    watchdog.received(7, 12.1)
     assert watchdog.age(12.5) == 2.0
 
 
@@ -323,6 +323,8 @@ def test_the_author_met_first_is_echoed_first_and_the_last_however_long_ago() ->
         bench.tell(0.2 * step, origin=Origin("next", step))
     first, second = FeedbackRef("iveg", 101), FeedbackRef("next", 49)
     assert bench.authors.echoes(9.8) == (first, second)
+    assert bench.authors.echoes(9.7) == (first, FeedbackRef("next", 48))
+    assert bench.authors.echoes(-0.1) == ()
     bench.tell(10.2, origin=Origin("next", 50))
     for now in (10.2, 99.0):
         assert bench.authors.echoes(now) == (FeedbackRef("next", 50),)

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from iveg.domain.geometry import Box3D
 from iveg.robot.grounding import (
     DepthPicture,
-    Grounded,
     Grounding,
     Mask,
     Pinhole,
@@ -128,7 +128,7 @@ def test_a_hole_is_never_accepted_and_vouches_for_nobody(hole: float) -> None:
 def test_the_least_probability_is_inclusive(probability: float, taken: bool) -> None:
     answer = ground(segment(probability=probability), DepthPicture(LENS, picture()))
 
-    assert isinstance(answer, Grounded) is taken
+    assert isinstance(answer, Box3D) is taken
 
 
 def test_a_target_without_a_place_says_why() -> None:
@@ -157,8 +157,8 @@ def test_a_person_in_a_picture_is_placed_within_a_quarter_metre(name: str) -> No
 
     found = ground(Segment("farmer", 0.9, width / 2, height / 2, mask), seen)
 
-    assert isinstance(found, Grounded)
-    right, down, ahead = found.box.centre
+    assert isinstance(found, Box3D)
+    right, down, ahead = found.centre
     miss = np.subtract((0.4 + ahead, -right, 0.6 - down), TRUE_PLACE)
     assert np.hypot(*miss[:2]) < 0.25
     assert abs(miss[2]) < 0.05

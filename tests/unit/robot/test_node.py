@@ -13,6 +13,7 @@ from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.observations import (
     CommandAnswer,
+    FeedbackRef,
     Instant,
     Odometry,
     Origin,
@@ -111,7 +112,7 @@ async def test_a_released_and_resumed_robot_drives_and_a_stop_zeroes_it(
     task = asyncio.create_task(bench.node.run())
     await bench.run(1.0, REST)
     machine = bench.node.machine
-    held = [hold.id for hold in bench.node.holds]
+    held = [hold.id for hold in bench.node.machine.holds.holds]
     bench.link.take(COMMANDS, release(held, machine.challenge))
     bench.link.take(COMMANDS, resume(machine.challenge))
     await bench.run(1.0, REST)
@@ -152,3 +153,15 @@ def test_a_retained_stop_holds_and_retained_feedback_is_no_author(bench: Bench) 
 
     assert bench.node.machine.holds.find("01STOP") is not None
     assert bench.node.machine.authors.echoes(bench.now) == ()
+
+
+def test_a_measurement_echoes_the_feedback_that_had_come_by_its_moment(
+    bench: Bench,
+) -> None:
+    for bench.now, seq in ((100.5, 1), (101.0, 2)):
+        said = codec.write_feedback(Feedback("AGII", Origin("cloud", seq)))
+        bench.link.take("/AGII/mqtt_feedback", said)
+    bench.node.sense(Odometry("", Origin(), Pose2D(0.0, 0.0, 0.0), REST), age_s=0.25)
+
+    (sent,) = codec.read_measure("AGI_odom", bench.link.sent[-1][1]).observations
+    assert (sent.origin.mono, sent.origin.echoes) == (0.75, (FeedbackRef("cloud", 1),))

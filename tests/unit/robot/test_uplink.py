@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import threading
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 from typing import Literal
 
@@ -18,6 +18,7 @@ from iveg.domain.observations import (
     Instant,
     LaserScan,
     Navigation,
+    Observation,
     Odometry,
     Origin,
     SafetyReport,
@@ -26,7 +27,7 @@ from iveg.domain.observations import (
 from iveg.ngsi import codec
 from iveg.robot.gate import Cap
 from iveg.robot.holds import HoldSet
-from iveg.robot.uplink import LEVELS, LaneMessage, Origins, SafetyLane, Uplink
+from iveg.robot.uplink import LEVELS, LaneMessage, SafetyLane, Sender, Uplink
 from tests.builders import START, detection, detection_frame, odometry, scan
 from tests.unit.robot.rig import AHEAD, REST, Rig, stop, until
 
@@ -147,19 +148,18 @@ async def test_with_sixteen_unconfirmed_the_newest_report_waits_for_room() -> No
 
 AT = Instant(7.25, START.wall)
 BLANK = Origin()
+Echoes = Callable[[float], tuple[FeedbackRef, ...]]
 
 
 class Wire:
     """Keeps what an uplink offered."""
 
-    def __init__(self, heard: list[FeedbackRef] | None = None) -> None:
+    def __init__(self, echoes: Echoes | None = None) -> None:
         self.sent: list[tuple[str, bytes]] = []
-        echoes = None if heard is None else lambda: tuple(heard)
         self.uplink = Uplink(
-            "AGI",
-            "iveg",
-            Origins("boot-a", 700, echoes=echoes),
+            Sender("AGI", "iveg", "boot-a", first_report=700),
             lambda topic, payload: self.sent.append((topic, payload)),
+            echoes,
         )
 
     def read(self) -> list[object]:
@@ -205,19 +205,28 @@ def test_a_report_for_iveg_alone_goes_past_the_agent_in_the_same_count() -> None
 
 
 def test_every_message_tells_what_had_been_heard_when_it_was_measured() -> None:
-    heard: list[FeedbackRef] = []
-    wire = Wire(heard)
-    wire.uplink.send(odometry(origin=BLANK), AT)
-    heard += [FeedbackRef("iveg", 41), FeedbackRef("other", 7)]
-    for one in (scan(origin=BLANK), detection_frame("AGI", detection(), origin=BLANK)):
-        wire.uplink.send(one, AT)
-    wire.uplink.send(odometry(origin=BLANK), AT)
+    old, new, other = (FeedbackRef(*ref) for ref in (("a", 40), ("a", 41), ("b", 7)))
+    wire = Wire(lambda at: (new, other) if at >= 7.0 else (old,) if at >= 5.0 else ())
+    for one in (odometry(), scan(), detection_frame("AGI", detection())):
+        for age_s in (4.0, 0.5, 0.0):
+            wire.uplink.send(replace(one, origin=BLANK), AT, age_s)
 
-    first, *others = [one.origin for one in wire.read() if hasattr(one, "origin")]
+    sent = [one.origin for one in wire.read() if isinstance(one, Observation)]
 
-    assert (first.acknowledgements, first.heard, first.mono) == (True, None, AT.mono)
-    told = [(one.acknowledgements, one.echoes) for one in others]
-    assert told == [(True, tuple(heard))] * 3
+    said = [(one.mono, AT.wall - (one.stamp_s or 0.0), one.echoes) for one in sent]
+    assert said == [(3.25, 4, ()), (6.75, 0.5, (old,)), (7.25, 0, (new, other))] * 3
+    assert all(one.acknowledgements for one in sent)
+
+
+def test_the_moments_of_a_topic_rise_whatever_stamps_do() -> None:
+    wire = Wire()
+    for number, age_s in enumerate((10.0, 0.05, 5.0, 9.0, 10.0, 0.0), 1):
+        at = Instant(number / 10, START.wall + number / 10)
+        wire.uplink.send(odometry(origin=BLANK), at, age_s)
+    read = [one.origin.mono for one in wire.read() if isinstance(one, Odometry)]
+    moments = [mono for mono in read if mono is not None]
+    assert moments == sorted({*moments, 0.15, 0.6})
+    assert len(moments) == 6
 
 
 # --- an agent that is behind --------------------------------------------------------

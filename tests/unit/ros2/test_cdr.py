@@ -78,9 +78,9 @@ def test_more_than_padding_and_a_count_that_no_message_can_hold_are_unreadable()
 
 
 def test_a_stamp_keeps_its_nanoseconds() -> None:
-    assert ros.Time.of(1700000000.25) == ros.Time(1700000000, 250_000_000)
+    assert ros.Time.from_seconds(1700000000.25) == ros.Time(1700000000, 250_000_000)
     assert ros.Time(3, 500_000_000).seconds == 3.5
-    assert ros.Time.of(-0.25) == ros.Time(-1, 750_000_000)
+    assert ros.Time.from_seconds(-0.25) == ros.Time(-1, 750_000_000)
 
 
 # --- type hash --------------------------------------------------------------------

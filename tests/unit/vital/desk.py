@@ -87,17 +87,17 @@ class Desk:
     def lag(self, seconds: float) -> None:
         """The newest heartbeat probe has been out for so long."""
         left = self.clock().later(-seconds)
-        self.health_monitor.sent(Origin("iveg", 1), left)
+        self.health_monitor.probe.sent(Origin("iveg", 1), left)
 
     def hear(
         self,
         observation: Observation,
         transport: TransportId = DIRECT.id,
         *,
-        asked: bool = False,
+        is_query_answer: bool = False,
     ) -> None:
         """One observation goes through the rule loop."""
-        received = Received(observation, self.clock(), transport, asked)
+        received = Received(observation, self.clock(), transport, is_query_answer)
         self.loop.step([received], self.clock())
 
     def drive(self, robot_id: str, x: float = 0.0, *, linear: float = 0.5) -> None:
@@ -134,7 +134,7 @@ class Desk:
     def answer(self, result: str, *, why: str | None = None) -> None:
         """AGI answers for the hold that it was last stopped with."""
         machine = self.commander.machine("AGI")
-        attempt = None if machine.once is None else machine.once.command_id
+        attempt = None if machine.order is None else machine.order.command_id
         said = replace(self.next_origin(), stamp=None, stamp_s=None)
         self.hear(
             CommandAnswer(

@@ -6,6 +6,7 @@ import pytest
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.observations import Origin
+from iveg.domain.parameters import ByClass
 from iveg.domain.records import (
     AlertRecord,
     DecisionRecord,
@@ -72,21 +73,23 @@ def test_a_sighting_is_told_to_the_fleet_at_once() -> None:
     assert len(told["AGI"].alerts) == 1
 
 
-def test_feedback_says_where_iveg_believes_each_robot_to_be() -> None:
+def test_feedback_has_the_rule_and_where_iveg_believes_each_robot_to_be() -> None:
     desk = watched(Desk())
+    desk.evaluator.rule = DetectionRule(radius_m=ByClass(2.0, {"robot": 3.0}))
     meet(desk)
 
     newest = {one.robot_id: one for one in desk.fleet.told}
     assert newest["AGII"].pose is not None
     assert newest["AGII"].pose.x == 50.0
     assert newest["AGII"].pose_stamp is not None
+    assert newest["AGI"].rule == {"radius_m": {"person": 2.0, "robot": 3.0}}
 
 
 def test_feedback_says_which_reports_were_seen_and_how_far_orion_is_behind() -> None:
     desk = watched(Desk())
     desk.report("AGI", factor=0.5, reason="stale")
     seen = desk.seq
-    desk.health_monitor.sent(Origin("iveg-boot", 1), desk.clock())
+    desk.health_monitor.probe.sent(Origin("iveg-boot", 1), desk.clock())
     desk.clock.now += 7.0
 
     desk.evaluator.publish(desk.clock())
@@ -328,7 +331,8 @@ def test_what_orion_kept_of_yesterday_makes_nobody_appear() -> None:
     kept = Origin("yesterday", 5, None, None)
 
     desk.hear(
-        detection_frame("AGII", detection("farmer", 1.0), origin=kept), asked=True
+        detection_frame("AGII", detection("farmer", 1.0), origin=kept),
+        is_query_answer=True,
     )
 
     assert desk.evaluator.people.known == {}

@@ -69,7 +69,7 @@ def test_f1_f2_f4_f6_f8_while_one_hop_is_broken_nobody_behind_it_is_accused(
 def test_f9_a_probe_that_orion_has_and_nobody_brought_blames_no_agent() -> None:
     monitor = healthy(10.0)
     for seq, second in enumerate((12.0, 14.0, 16.0)):
-        monitor.sent(Origin("b", seq), at(second))
+        monitor.probe.sent(Origin("b", seq), at(second))
         monitor.stored(Origin("b", seq))
     monitor.orion_ok_at = at(17.0).mono
 
@@ -103,7 +103,7 @@ def test_f3_f7_f8_what_is_told_of_a_hop_is_its_state_and_detail_while_all_else_p
 
 def test_a_probe_that_takes_long_makes_the_agent_late() -> None:
     monitor = healthy(10.0)
-    monitor.sent(Origin("b", 1, "now"), at(7.0))
+    monitor.probe.sent(Origin("b", 1, "now"), at(7.0))
     monitor.received(Origin("b", 1), at(10.0))
 
     late = hop(monitor, "iot_agent", 10.0)

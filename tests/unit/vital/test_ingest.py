@@ -88,7 +88,7 @@ def test_an_unknown_robot_is_counted_each_time_and_logged_once(
 def test_what_was_asked_for_is_counted_apart_from_what_was_sent() -> None:
     queue = ingest()
 
-    queue.enqueue(replace(received(odometry()), asked=True))
+    queue.enqueue(replace(received(odometry()), is_query_answer=True))
     queue.enqueue(received(odometry()))
     queue.enqueue(received(safety_report(), transport=DIRECT.id))
 

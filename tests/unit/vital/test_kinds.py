@@ -51,10 +51,10 @@ def kept(world: World, place: str) -> object:
     return repr(getattr(robot if hasattr(robot, place) else world, place))
 
 
-@pytest.mark.parametrize("row", KINDS, ids=lambda row: row.of.__name__)
+@pytest.mark.parametrize("row", KINDS, ids=lambda row: row.type_.__name__)
 def test_a_kind_lands_where_its_row_says(row: Kind) -> None:
     world = World(("AGI",))
-    observation = next(one for one in SAID if isinstance(one, row.of))
+    observation = next(one for one in SAID if isinstance(one, row.type_))
     before = kept(world, row.lands or "sensed")
 
     world.apply(Received(observation, at(1.0)))
@@ -62,15 +62,15 @@ def test_a_kind_lands_where_its_row_says(row: Kind) -> None:
     assert (kept(world, row.lands or "sensed") != before) == (row.lands is not None)
 
 
-@pytest.mark.parametrize("row", KINDS, ids=lambda row: row.of.__name__)
+@pytest.mark.parametrize("row", KINDS, ids=lambda row: row.type_.__name__)
 def test_a_copy_is_news_only_where_its_row_orders_by_arrival(row: Kind) -> None:
     world = World(("AGI",))
-    observation = next(one for one in SAID if isinstance(one, row.of))
+    observation = next(one for one in SAID if isinstance(one, row.type_))
     world.apply(Received(observation, at(1.0)))
 
-    verdict = world.apply(Received(observation, at(2.0)))
+    freshness = world.apply(Received(observation, at(2.0)))
 
-    assert verdict == ("duplicate" if row.ordered == "counted" else "new")
+    assert freshness == ("duplicate" if row.ordered == "counted" else "new")
 
 
 async def test_a_battery_at_a_fifth_is_a_p3_until_it_is_at_a_quarter() -> None:

@@ -10,14 +10,14 @@ from tests.unit.vital.desk import Desk
 
 
 def took(desk: Desk, hop: Segment) -> Sketch:
-    stream = desk.latency.streams[0]
+    stream = next(iter(desk.latency.streams.values()))
     return merged(stream.segments[hop].parts())
 
 
 def test_a_copy_that_comes_twice_counts_once_and_an_answer_not_at_all() -> None:
     desk = Desk()
     told = odometry("AGI", origin=desk.next_origin())
-    desk.ingest.enqueue(Received(told, desk.clock(), FIWARE.id, asked=True))
+    desk.ingest.enqueue(Received(told, desk.clock(), FIWARE.id, is_query_answer=True))
     assert took(desk, "robot_orion").count == 0
 
     for way in (DIRECT.id, DIRECT.id, FIWARE.id, FIWARE.id):

@@ -60,7 +60,7 @@ class Air(Stage):
 
     def took(self, robot_id: str, hop: Segment) -> Sketch:
         """What a hop took for a robot's odometry in the last minute."""
-        streams = self.desk.latency.streams
+        streams = self.desk.latency.streams.values()
         one = next(s for s in streams if (s.robot_id, s.data) == (robot_id, "odometry"))
         return merged(one.segments[hop].parts())
 

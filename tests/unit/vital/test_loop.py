@@ -13,6 +13,7 @@ from iveg.domain.observations import (
     Origin,
     Received,
 )
+from iveg.domain.stream_order import Freshness
 from iveg.vital.evaluate import HEARTBEAT_S
 from iveg.vital.health_monitor import GRACE_S
 from iveg.vital.loop import TICK_S
@@ -56,7 +57,7 @@ async def test_pages_are_shown_what_came_before_the_fleet_is_judged() -> None:
         async with asyncio.timeout(30):
             await browser.news()
         was_unjudged = desk.evaluator.is_unjudged
-        assert "robots/AGI" in browser.drain_telemetry()
+        assert "robots/AGI" in browser.telemetry
         await settle()
 
         assert (was_unjudged, desk.evaluator.is_unjudged) == (True, False)
@@ -70,7 +71,7 @@ async def test_the_fleet_is_judged_however_much_comes_all_the_time(
     shown = desk.hub.join()
     numbers = itertools.count(1)
 
-    def more(*args: Any) -> bool:
+    def more(*args: Any) -> Freshness:
         said = odometry(origin=Origin("b", next(numbers)))
         asyncio.get_running_loop().call_soon(enqueue, Received(said, desk.clock()))
         return apply(*args)
@@ -81,7 +82,7 @@ async def test_the_fleet_is_judged_however_much_comes_all_the_time(
         for _ in range(100):
             await asyncio.sleep(0)
 
-        assert "robots/AGI" in shown.drain_telemetry()
+        assert "robots/AGI" in shown.telemetry
         assert desk.fleet.told
 
 

@@ -9,15 +9,15 @@ from functools import partial
 
 import pytest
 
-from iveg.lab.emulator.orders import FaultOrder
+from tests.faulty_world import Faults
 from tests.stage import Stage
 
 QUIET_S = 60 * int(os.environ.get("IVEG_QUIET_MINUTES", "1"))
 """`IVEG_QUIET_MINUTES=20` looks as long as the promise is."""
 FAULTS = {
-    "alert.person_not_slowing": FaultOrder(robot="AGII", deaf=True),
-    "alert.clock_offset": FaultOrder(robot="AGII", clock_offset_s=30.0),
-    "alert.moving_robot_lost": FaultOrder(robot="AGI", mute=True),
+    "alert.person_not_slowing": ("AGII", Faults(deaf=True)),
+    "alert.clock_offset": ("AGII", Faults(clock_offset_s=30.0)),
+    "alert.moving_robot_lost": ("AGI", Faults(mute=True)),
 }
 
 
@@ -29,9 +29,9 @@ async def test_13_10_a_quiet_run_raises_nothing_and_each_fault_its_alert() -> No
     quiet = stage.log(None, "log.alert.raised")
     slowed = stage.log(None, "log.speed_down.person")
 
-    for key, fault in FAULTS.items():
-        await stage.until(partial(drives, stage, fault.robot), "it drives")
-        stage.happen(fault)
+    for key, (robot_id, faults) in FAULTS.items():
+        await stage.until(partial(drives, stage, robot_id), "it drives")
+        stage.happen(robot_id, faults)
         await stage.until(partial(tells, stage, key), key, 240.0)
 
     assert quiet == []

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from iveg.app.dss import open_dss
+from iveg.app import App
 from iveg.domain.errors import SettingsError
 from iveg.domain.observations import Received
 from iveg.domain.transports import DIRECT, FIWARE
@@ -45,4 +45,4 @@ def test_a_name_that_no_robot_has_ends_the_start(tmp_path: Path) -> None:
     settings = Settings(robots=("AGI",), refused_robots=("AGX",))
 
     with pytest.raises(SettingsError, match="AGX"):
-        open_dss(settings, tmp_path)
+        App(settings, tmp_path)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from iveg.domain.feedback import FULL_SPEED, HALF_SPEED
 from iveg.domain.observations import ReportedObstacle
-from iveg.domain.tracking.tracker import MAX_WALKERS
+from iveg.domain.tracking.tracker import MAX_LASER_TRACKS
 from tests.builders import safety_report
 from tests.unit.domain.scene import Scene, person
 from tests.unit.vital.desk import Desk
@@ -45,7 +45,7 @@ def test_what_has_not_moved_or_orion_kept_is_nobody() -> None:
     desk = Desk(("AGI", "AGII"))
     beside(desk)
     kept = replace(safety_report(), obstacle=ReportedObstacle(6.5, 0.0, 0.5, True))
-    desk.hear(replace(kept, origin=desk.next_origin()), asked=True)
+    desk.hear(replace(kept, origin=desk.next_origin()), is_query_answer=True)
 
     assert beside(desk, (6.5, 0.0), moved=False)["AGII"] == FULL_SPEED
     assert desk.evaluator.people.known == {}
@@ -67,16 +67,16 @@ def test_whom_a_camera_sees_there_has_one_name_and_both_zones() -> None:
 
 def test_one_robots_walkers_take_no_place_of_anothers() -> None:
     scene = Scene()
-    for number in range(MAX_WALKERS + 4):
+    for number in range(MAX_LASER_TRACKS + 4):
         kept = scene.walks_by("AGI", -50.0 + 6.0 * number)
-        assert (kept is not None) == (number < MAX_WALKERS)
+        assert (kept is not None) == (number < MAX_LASER_TRACKS)
 
     assert scene.walks_by("AGII", 50.0) is not None
 
 
 def test_walkers_of_long_ago_make_room_for_new_ones() -> None:
     scene = Scene()
-    for number in range(4 * MAX_WALKERS):
+    for number in range(4 * MAX_LASER_TRACKS):
         scene.now = number * 1.0
         assert scene.walks_by("AGI", -50.0 + 4.0 * number) is not None
-    assert len(scene.everyone) <= MAX_WALKERS
+    assert len(scene.everyone) <= MAX_LASER_TRACKS

@@ -2,7 +2,7 @@
 
 import pytest
 
-from iveg.domain.words import WordAnswer
+from iveg.domain.detector import WordAnswer
 from tests.builders import detection
 from tests.unit.vital.desk import Desk, conditions_of
 from tests.unit.vital.test_frames import factors, parked

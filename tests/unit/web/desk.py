@@ -4,22 +4,21 @@ import asyncio
 import contextlib
 from collections import Counter
 from collections.abc import AsyncIterator, Sequence
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 import httpx
 import uvicorn
 
+from iveg.adapters.reconciler import OwnSubscriptions
 from iveg.adapters.recordings.pictures import PictureFiles
-from iveg.adapters.recordings.recorder import InputRecorder
+from iveg.asgi import WebParts, build_app, live_routers
 from iveg.domain.equipment import Tile
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.observations import Instant
 from iveg.vital.audit import AuditTrail
 from iveg.web import notifications
 from iveg.web.api import health
 from iveg.web.bounded_http import bounded_http
-from iveg.web.build import WebParts, build_app, live_routers
 from iveg.web.live import encoder
 from iveg.web.live.pictures import Past
 from iveg.web.live.socket import BoundedSocket
@@ -30,9 +29,9 @@ from iveg.web.security.people import People
 from iveg.web.security.roles import Role
 from iveg.web.views import Views
 from tests.fakes.accounts import FakeBook, FakePasswords
+from tests.fakes.recordings import input_recorder
 from tests.fakes.worker import FakeWorker
 from tests.unit.vital.desk import FIELD, Desk
-from tests.unit.web.when_asked import RoutesWhenAsked
 
 HOST = "iveg.test"
 API_TOKEN = "a-token-for-programs"
@@ -56,8 +55,7 @@ class WebDesk(Desk):
         recordings: Path = Path("nowhere"),
     ) -> None:
         super().__init__(robots, greenhouse, tiles=tiles)
-        self.heard: list[Instant] = []
-        self.former_secrets: set[str] = set()
+        self.subscriptions = OwnSubscriptions(frozenset({"ours"}))
         self.queues = health.Queues({"ingest": 3}, {"history": 2})
         self.trail = AuditTrail(self.sink, self.ids)
         self.book, self.passwords = FakeBook(), FakePasswords()
@@ -73,19 +71,14 @@ class WebDesk(Desk):
         self.views = Views(self.parts, lambda: self.counters)
         self.encoder = encoder.Encoder(self.views, self.hub, self.clock)
         self.notifications = notifications.NotificationEndpoint(
+            self.parts.core,
             self.ingest,
             SECRET,
-            self.clock,
-            self,
+            self.subscriptions,
             ("agroconnect", "/greenhouse"),
-            notifications.Followers(
-                self.heard.append,
-                self.parts.equipment.equipment.entities,
-                partial(self.parts.core.supervision.tell, "entity_read"),
-                lambda *_: None,
-            ),
+            self.parts.equipment.equipment.entities,
         )
-        self.recordings = InputRecorder(recordings, self.clock)
+        self.recordings = input_recorder(recordings, self.clock)
         self.face = WebParts(
             pipeline=self.parts,
             views=self.views,
@@ -103,19 +96,7 @@ class WebDesk(Desk):
         )
         self.http = bounded_http()
         self.pages = _pages(self.face.site)
-        self.app = build_app(self.face, self.pages, routers=())
-        makers = list(live_routers(self.face))
-        self.app.add_middleware(RoutesWhenAsked, face=self.app, makers=makers)
-
-    # --- the subscriptions of iVeg --------------------------------------------------
-
-    def is_ours(self, subscription_id: str) -> bool:
-        """One alone is."""
-        return subscription_id == "ours"
-
-    def is_former(self, secret: str) -> bool:
-        """Those that a test names are."""
-        return secret in self.former_secrets
+        self.app = build_app(self.face, self.pages, live_routers(self.face))
 
     # --- who asks -----------------------------------------------------------------
 

@@ -123,7 +123,7 @@ async def test_f59_a_stop_gets_through_where_half_requests_take_every_place() ->
             while len(desk.http.table) != 10:  # noqa: ASYNC110 - no event
                 await asyncio.sleep(0.005)
         assert await (await connect()).say(STOP).status() == 202
-        assert desk.hub.watchers == 1
+        assert len(desk.hub.subscribers) == 1
 
 
 async def test_the_oldest_idle_connection_goes_before_one_that_is_answered() -> None:

@@ -21,7 +21,7 @@ def met() -> WebDesk:
     """One that AGI's boot has spoken to."""
     desk = WebDesk()
     desk.notifications.receive(ours(attributes={ODOMETRY: pose_value(seq=0)}))
-    desk.heard.clear()
+    desk.health_monitor.notified_at = None
     return desk
 
 
@@ -33,8 +33,8 @@ async def test_a_notification_is_taken_and_queued() -> None:
     (queued,) = desk.ingest.drain()
     assert (answer.status_code, answer.content) == (204, b"")
     assert isinstance(queued.observation, Odometry)
-    assert (queued.transport, queued.asked) == ("fiware", False)
-    assert desk.heard == [desk.clock()]
+    assert (queued.transport, queued.is_query_answer) == ("fiware", False)
+    assert desk.health_monitor.notified_at == desk.clock().mono
 
 
 @pytest.mark.parametrize(
@@ -54,7 +54,7 @@ async def test_f35_a_wrong_secret_is_401_and_counted(
     secret: str | None, counted: str
 ) -> None:
     desk = WebDesk()
-    desk.former_secrets.add(FORMER)
+    desk.subscriptions.former_secrets = frozenset({FORMER})
     headers = [(k.encode(), v.encode()) for k, v in TENANT.items()]
     given = [] if secret is None else [secret.encode("latin-1")]
     headers += [(b"X-Iveg-Notify-Token", text) for text in given]
@@ -66,7 +66,7 @@ async def test_f35_a_wrong_secret_is_401_and_counted(
     assert list(desk.ingest.drain()) == []
     rejected = {name for name in desk.ingest.counters if name.startswith("rejected")}
     assert rejected == {f"rejected.{counted}"}
-    assert desk.heard == []
+    assert desk.health_monitor.notified_at is None
 
 
 @pytest.mark.parametrize(("size", "status"), [(1_048_576, 400), (1_048_577, 413)])
@@ -96,20 +96,6 @@ async def test_an_unknown_subscription_or_tenant_is_taken_ignored_and_counted(
     assert answer.status_code == 204
     assert list(desk.ingest.drain()) == []
     assert desk.ingest.counters[f"rejected.{counted}"] == 1
-
-
-async def test_what_is_replayed_changes_nothing() -> None:
-    desk = met()
-    async with desk.orion() as orion:
-        for seq, x in ((1, 1.0), (2, 2.0), (1, 1.0)):
-            value = pose_value(x, seq=seq)
-            await orion.post(URL, content=ours(attributes={ODOMETRY: value}))
-    desk.loop.step(desk.ingest.drain(), desk.clock())
-
-    newest = desk.world.robot("AGI").odometry
-    assert newest is not None
-    assert newest.pose.x == 2.0
-    assert desk.world.counters["Odometry.duplicate"] == 1
 
 
 @pytest.mark.parametrize("boot", ["boot-a", None])
@@ -149,6 +135,18 @@ async def test_boxes_of_the_first_frame_of_a_boot_slow_and_prove_no_detector() -
     assert desk.evaluator.speed_limits["AGII"].reason == "person"
     assert desk.world.robot("AGI").detector.whole_at is None
     assert desk.ingest.counters["alone.DetectionFrame"] == 1
+
+
+def test_what_is_replayed_changes_nothing() -> None:
+    desk = met()
+    for batch in ([(1, 1)], [(1, "")], [(2, "")], [(2, 2)], [(3, 3), (4, 4), (3, 5)]):
+        for seq, x in batch:
+            said = {ODOMETRY: pose_value(seq=seq) | {"x": x}}
+            desk.notifications.receive(ours(attributes=said))
+        desk.loop.step(desk.ingest.drain(), desk.clock())
+    assert desk.views.robot("AGI", desk.clock()).model_dump()["pose"]["x"] == 4.0
+    assert desk.world.counters["Odometry.duplicate"] == 1
+    assert desk.ingest.counters["rejected.bad_base_pose_ground_truth"] == 1
 
 
 async def test_a_body_without_a_length_is_413_as_soon_as_it_is_too_long() -> None:

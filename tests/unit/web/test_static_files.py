@@ -9,7 +9,7 @@ from starlette.applications import Starlette
 from starlette.routing import Mount
 from starlette.staticfiles import StaticFiles
 
-from iveg.asgi import KeptFiles
+from iveg.web.static_files import KeptFiles
 
 Client = httpx.AsyncClient
 

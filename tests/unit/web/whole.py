@@ -1,7 +1,6 @@
 """The whole server as programs and browsers see it; only what is outside is fake."""
 
 import asyncio
-import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -10,13 +9,12 @@ from pathlib import Path
 import httpx
 from fastapi import FastAPI
 
-from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.recorder import Recorder
 from iveg.adapters.journal import FileJournal
-from iveg.app.dss import Dss
-from iveg.app.outside import Outside
+from iveg.app import App, Connections
 from iveg.asgi import create_app
+from iveg.domain.accounts import digest_of
 from iveg.domain.records import Record
 from iveg.domain.transports import DIRECT, FIWARE, Transport
 from iveg.settings import Settings
@@ -43,16 +41,16 @@ class _Recorder(Recorder):
         self.records.append(record)
 
 
-class _Dss(Dss):
+class _Connections(Connections):
     """STOP goes to robots and to a context broker that take everything."""
 
-    def _ports(self) -> Ports:
+    def ports(self, settings: Settings) -> Ports:
         fleet = FakeFleet()
         ways: dict[Transport, CommandPort] = {
             DIRECT: fleet,
             FIWARE: FakeContextBroker(),
         }
-        return replace(super()._ports(), fleet=fleet, transports=ways)
+        return replace(super().ports(settings), fleet=fleet, transports=ways)
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,7 @@ class WholeServer:
         headers: Who asks, by role.
     """
 
-    dss: Dss
+    parts: App
     app: FastAPI
     runner: asyncio.Runner
     client: httpx.AsyncClient
@@ -90,22 +88,20 @@ def whole_server(folder: Path) -> Iterator[WholeServer]:
     url = history_url(None, folder)
     lay_history(url)
     chosen = Settings(api_token=API_TOKEN)
-    fleet = load_fleet(chosen.fleet, chosen.robots)
-    outside = Outside(chosen, folder)
-    real, recorder = outside.stores.recorder, _Recorder(url, folder)
-    outside.stores.recorder = recorder
-    dss = _Dss(chosen, fleet, outside)
-    dss.worker = dss.packer = FakeWorker()  # type: ignore[assignment]
-    dss.web = replace(dss.web, worker=FakeWorker())
-    app = create_app(dss)
+    connections = _Connections(chosen, folder)
+    real, recorder = connections.recorder, _Recorder(url, folder)
+    connections.recorder = recorder
+    parts = App(chosen, folder, connections=connections)
+    parts.worker = parts.packer = FakeWorker()
+    app = create_app(parts)
     transport = httpx.ASGITransport(app, raise_app_exceptions=False)
     client = httpx.AsyncClient(transport=transport, base_url="http://iveg.test")
     with asyncio.Runner() as runner:
         yield WholeServer(
-            dss, app, runner, client, recorder.records, _headers_of_roles(app)
+            parts, app, runner, client, recorder.records, _headers_of_roles(app)
         )
         runner.run(client.aclose())
-        runner.run(dss.outside.close())
+        runner.run(connections.close())
         runner.run(real.close())
 
 
@@ -116,9 +112,10 @@ def _headers_of_roles(app: FastAPI) -> dict[str, dict[str, str]]:
         role: {**page, "Cookie": f"iveg={sessions.open('ana', role)}"} for role in MAY
     }
     token = sessions.open("ana", "admin")
-    digest = hashlib.sha256(token.encode()).digest()
-    old = sessions._sessions[digest]
-    sessions._sessions[digest] = replace(old, began=old.began - LASTS_S * 1.5)
+    digest = digest_of(token)
+    known = app.state.authenticator.people.book.sessions
+    old = known[digest]
+    known[digest] = replace(old, began=old.began - LASTS_S * 1.5)
     told["expired"] = {**page, "Cookie": f"iveg={token}"}
     told["program"] = {"Authorization": f"Bearer {API_TOKEN}"}
     return {**told, STRANGER: page}

@@ -68,7 +68,6 @@ def test_straight_ahead_it_is_the_way_to_the_ring_by_the_speed(radius: float) ->
     found = ahead.see((1.6 + radius, 0.0)).must()
     assert found.in_s == pytest.approx(1.6 / 0.8, abs=MS_10)
     assert (found.zone.cause, found.zone.radius_m) == ("P1", radius)
-    assert not found.zone.is_grown
 
 
 def test_reversing_it_is_behind() -> None:

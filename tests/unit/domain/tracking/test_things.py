@@ -3,7 +3,7 @@
 import pytest
 
 from iveg.domain.observations import Instant
-from iveg.domain.tracking.person import Thing
+from iveg.domain.tracking.things import Thing
 from tests.builders import at
 from tests.unit.domain.scene import Scene, machine, person
 

@@ -4,7 +4,7 @@ from collections.abc import AsyncIterator
 import aiomqtt
 import pytest
 
-from iveg.adapters.iot_agent import IotAgentClient
+from iveg.adapters.iot_agent import DEVICES, IotAgentClient
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.reconciler import FiwareSite, provision
 from iveg.domain.errors import HopError
@@ -77,16 +77,16 @@ async def test_a_device_of_another_shape_or_with_what_is_not_supported_is_refuse
 ) -> None:
     entity = {"entity_name": "AGI", "entity_type": "Robot"}
     async with IotAgentClient(up.iota_url, *TENANT) as agent:
+        device = {"device_id": "D", "apikey": "iveg", **entity, **part}
         with pytest.raises(HopError, match="400"):
-            await agent.create_device(
-                {"device_id": "D", "apikey": "iveg", **entity, **part}
-            )
+            await agent.create(DEVICES, {"devices": [device]})
 
 
-async def test_a_command_whose_provider_is_away_is_404(
+async def test_a_command_of_a_device_that_the_agent_lost_is_404(
     up: Running, orion: OrionClient
 ) -> None:
-    stale = Registration(new_id(), TENANT[1], "OLD", "Robot", ("cmd",), "http://gone")
+    known = new_id(), TENANT[1], "OLD", "Robot", ("cmd",)
+    stale = Registration(*known, "http://gone", up.agent.command)
     up.broker.tenant(TENANT[0]).registrations[stale.id] = stale
     with pytest.raises(HopError, match="404"):
         await orion.update_command("OLD", {"stop": {}})
@@ -103,6 +103,6 @@ async def test_a_device_is_of_the_tenant_of_the_request_whatever_it_says(
         "entity_type": "Robot",
     }
     async with IotAgentClient(up.iota_url, *TENANT) as agent:
-        await agent.create_device(device)
-        (made,) = await agent.read_devices()
+        await agent.create(DEVICES, {"devices": [device]})
+        (made,) = await agent.read_all(DEVICES, part="devices")
     assert (made["service"], made["service_path"]) == TENANT

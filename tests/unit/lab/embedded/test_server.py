@@ -3,6 +3,7 @@ import contextlib
 import gc
 import logging
 from contextlib import AsyncExitStack
+from urllib.parse import urlsplit
 
 import aiomqtt
 import httpx
@@ -57,7 +58,8 @@ async def test_closing_under_clients_leaves_no_task_and_no_warning(
             for number in range(50):
                 await mqtt.publish("/iveg/AGI/attrs", b'{"n":%d}' % number)
             await http.get(up.orion_url + "/v2/entities")
-            _, half = await asyncio.open_connection("127.0.0.1", up.orion_port)
+            orion = urlsplit(up.orion_url)
+            _, half = await asyncio.open_connection(orion.hostname, orion.port)
             half.write(b"POST /v2/entities HTTP/1.1\r\nContent-Le")
             await half.drain()
         with pytest.raises(aiomqtt.MqttError):
@@ -90,7 +92,8 @@ async def ended(reader: asyncio.StreamReader) -> bytes:
 )
 async def test_an_endless_head_is_refused(head: bytes) -> None:
     async with embedded_fiware() as up:
-        reader, writer = await asyncio.open_connection("127.0.0.1", up.orion_port)
+        orion = urlsplit(up.orion_url)
+        reader, writer = await asyncio.open_connection(orion.hostname, orion.port)
         writer.write(head)
         said = await ended(reader)
         writer.close()

@@ -20,7 +20,7 @@ from iveg.lab.emulator.greenhouse import Disc, Scenery
 from tests.builders import AGI
 
 BOUNDS = Rectangle(-20.0, -20.0, 20.0, 20.0)
-OPEN = Scenery.of(Greenhouse("yard", BOUNDS))
+OPEN = Scenery.from_greenhouse(Greenhouse("yard", BOUNDS))
 HERE = Pose2D(0.0, 0.0, 0.0)
 EVERY_S = 2.5
 """Longer than any encounter, so that each look is an encounter of its own."""
@@ -53,13 +53,6 @@ def test_a_person_in_view_becomes_a_box_in_base_link() -> None:
     assert found.frame_id == "base_link"
     assert found.box.centre == pytest.approx((5.0, 0.0, 0.875))
     assert found.box.zmin == 0.0
-
-
-def test_crop_hides_a_person() -> None:
-    row = Rectangle(2.0, -3.0, 2.5, 3.0)
-    garden = Scenery.of(Greenhouse("garden", BOUNDS, rows=(row,)))
-
-    assert looks(person(4.0, 0.0), scenery=garden) == [()]
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ GREENHOUSE = Greenhouse(
     posts=(StructuralPost(7.0, 7.0, 0.1),),
     obstacles=(PlacedObstacle("crates", Rectangle(8.0, 1.0, 9.0, 2.0)),),
 )
-SCENERY = Scenery.of(GREENHOUSE)
+SCENERY = Scenery.from_greenhouse(GREENHOUSE)
 
 
 def robot(x: float, y: float, yaw: float = 0.0, robot_id: str = "AGI") -> Body:
@@ -45,7 +45,7 @@ def swept(
     others: Sequence[Body] = (),
     model: LaserModel = EXACT,
 ) -> NDArray[np.float32]:
-    scenery = Scenery.of(greenhouse)
+    scenery = Scenery.from_greenhouse(greenhouse)
     return sweep(sensor, model, scenery, people, others, np.random.default_rng(1))
 
 

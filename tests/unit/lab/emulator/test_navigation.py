@@ -10,14 +10,12 @@ from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import REST, Pose2D, Twist2D
 from iveg.domain.goals import Goal, GoalKind
 from iveg.lab.emulator.camera import DETECTORS
-from iveg.lab.emulator.greenhouse import Disc, Scenery
+from iveg.lab.emulator.greenhouse import Disc
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.navigation import (
     CLEARANCE_M,
     Follower,
-    Odometer,
     Vehicle,
-    way_between,
 )
 from iveg.lab.emulator.scenarios import Route, Station, route_of, scenario_named
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
@@ -48,15 +46,6 @@ def test_a_vehicle_speeds_up_and_brakes_within_its_limits() -> None:
     assert vehicle.pose.x - x_at_full_speed == pytest.approx(0.5, abs=0.03)
 
 
-def test_agi_turns_on_the_spot() -> None:
-    vehicle = Vehicle(AGI, ORIGIN)
-
-    drive(vehicle, Twist2D(0.0, 1.0), 2.0)
-
-    assert (vehicle.pose.x, vehicle.pose.y) == (0.0, 0.0)
-    assert vehicle.pose.yaw > 1.0
-
-
 @given(
     commands=st.lists(
         st.tuples(st.floats(-1.0, 1.0), st.floats(-2.0, 2.0)), max_size=30
@@ -73,23 +62,8 @@ def test_agii_never_turns_tighter_than_two_metres(
         assert abs(twist.angular_z) <= abs(twist.linear_x) / 2.0 + 1e-9
 
 
-def test_odometry_errs_but_does_not_drift_away_in_an_hour() -> None:
-    odometer = Odometer(np.random.default_rng(1))
-    twist, truth, errors = Twist2D(0.8, 0.3), Pose2D(3.0, 4.0, 0.5), []
-
-    for _ in range(36_000):
-        believed = odometer.measure(truth, twist, 0.1)
-        errors.append(truth.distance_to(believed.x, believed.y))
-
-    early, late = np.array(errors[1_000:10_000]), np.array(errors[-9_000:])
-    assert 0.01 < late.mean() < 0.08
-    assert late.mean() < 2.0 * early.mean()
-    assert max(errors) < 0.3
-
-
 TICK_S = 0.05
 SQUARE = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))
-LINE = ((0.0, 0.0), (8.0, 0.0))
 
 
 class Trip:
@@ -140,23 +114,6 @@ def test_a_robot_keeps_to_its_route_for_two_rounds(
     driven = sum(abs(twist.linear_x) * TICK_S for twist in trip.twists)
     assert driven > 50.0
     assert trip.farthest_off < 0.15
-
-
-def test_agi_turns_on_the_spot_at_the_end_of_its_line_and_comes_back() -> None:
-    trip = Trip(AGI, route_of(LINE, 0.0, False)).drive(22.0)
-
-    assert max(p.x for p in trip.places) > 7.5
-    assert trip.places[-1].x < 6.0
-    assert min(twist.linear_x for twist in trip.twists) >= 0.0
-    assert trip.farthest_off < 0.15
-
-
-def test_agii_reverses_on_a_line_because_it_cannot_turn_there() -> None:
-    trip = Trip(AGII, route_of(LINE, 0.0, False)).drive(30.0)
-
-    assert trip.places[-1].x < 4.0
-    assert min(twist.linear_x for twist in trip.twists) < -0.5
-    assert max(abs(p.yaw) for p in trip.places) < 0.2
 
 
 def test_a_robot_waits_before_a_person_and_goes_on_when_the_way_is_free() -> None:
@@ -238,27 +195,6 @@ def test_a_robot_that_was_on_its_way_to_a_goal_stands_once_it_is_taken_away() ->
     assert drive.away(10.0, 12.0) <= NEAR_M
 
 
-def test_a_pause_stands_and_a_return_ends_on_its_own_route() -> None:
-    drive = Drive()
-    drive.run(14.0)
-    assert drive.send(0.0, 0.0, "pause")
-    drive.run(3.0)
-    paused = drive.rig.vehicle.pose
-    drive.run(10.0)
-    assert drive.rig.vehicle.pose == paused
-
-    start = TESTBED.starts[0]
-    assert drive.send(start.x, start.y, "return")
-    drive.run(60.0)
-
-    drive.rig.pursue(None, drive.world)
-    before = drive.rig.vehicle.pose
-    drive.run(90.0)
-    assert drive.away(before.x, before.y) > 0.0
-    assert drive.rig.navigation().task in ("scouting", "waiting")
-    assert drive.rig.navigation().path != ()
-
-
 def test_a_robot_with_a_turning_radius_knows_its_own_route_alone() -> None:
     drive = Drive("AGII")
 
@@ -267,11 +203,3 @@ def test_a_robot_with_a_turning_radius_knows_its_own_route_alone() -> None:
     assert drive.send(18.0, 10.0)
     drive.run(120.0)
     assert drive.away(18.0, 10.0) <= NEAR_M
-
-
-def test_into_a_row_there_is_no_way() -> None:
-    row = TESTBED.rows[0]
-    middle = (row.xmin + row.xmax) / 2, (row.ymin + row.ymax) / 2
-    wide = way_between((2.0, 10.0), middle, Scenery.of(TESTBED), 0.8)
-
-    assert wide is None

@@ -57,15 +57,16 @@ class Emulated:
         for topic, name in sensed_topics(self.config.full_topics).items():
             writer = self.network.writers.get(name)
             if writer is not None:
-                senses.hear(topic, writer.sent, now.mono - 1.0)
-        return senses.tick(now)
+                senses.receive(topic, writer.sent, now.mono - 1.0)
+        return [sensed.observation for sensed in senses.tick(now)]
 
 
 @pytest.fixture
 async def emulated() -> AsyncIterator[Emulated]:
     found = Emulated()
     task = asyncio.create_task(found.base.run(clock.mono(), 0.0))
-    await found.base.started.wait()
+    mounts = found.network.writers[found.config.full_topics["tf_static"]]
+    await until(lambda: mounts.sent)
     yield found
     task.cancel()
     await asyncio.gather(task, return_exceptions=True)

@@ -9,23 +9,11 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import PERSON_RADIUS_M
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.kinds import SENSED
 from iveg.lab.emulator.camera import DETECTORS, PERSON, Counts, DetectorModel
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import SCENARIOS, scenario_named
-from iveg.lab.emulator.world import Driving, SimulatedWorld, battery_after, true_picture
+from iveg.lab.emulator.world import SimulatedWorld, true_picture
 from tests.touching import bodies_touch, touches
-
-TWENTY_MINUTES_S, TWO_DAYS_S = 1_200, 172_800
-
-
-def test_an_emulated_battery_drains_and_never_raises_an_alert() -> None:
-    (low,) = (row.sensor.low for row in SENSED if row.sensor and row.sensor.low)
-    levels = [battery_after(float(s)).percentage for s in range(0, TWO_DAYS_S, 60)]
-
-    assert battery_after(TWENTY_MINUTES_S).percentage == 0.908
-    assert all(level is not None and low.above < level <= 1.0 for level in levels)
-
 
 BLIND = DetectorModel(0.9, counts={"farmer": Counts(0, 0, 1), "AGI": Counts(0, 0, 1)})
 
@@ -35,7 +23,7 @@ def test_everybody_is_in_the_truth_with_the_robot_s_true_pose() -> None:
     layout = lay_out(scenario_named("demo"), ("AGI", "AGII"), greenhouse)
     world = SimulatedWorld(greenhouse, layout, BLIND, seed=1)
 
-    told: Any = true_picture(world.rigs["AGI"], world, 1000.5, Driving(0.6, 0.5))
+    told: Any = true_picture(world.rigs["AGI"], world, 1000.5, 0.6, 0.5)
 
     pose = world.rigs["AGI"].vehicle.pose
     assert [one["key"] for one in told["people"]] == [f"person-{n}" for n in range(4)]

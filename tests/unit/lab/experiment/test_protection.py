@@ -169,5 +169,5 @@ def test_what_was_foretold_is_of_the_person_who_really_is_there(
 
     here, there = moments_of([row("AGI", 0.1, 5.0), row("AGII", 0.1, 5.0)], told)
 
-    assert [one.name for one in here.people if one.foretold] == foretold
-    assert not any(one.foretold for one in there.people)
+    assert [one.name for one in here.people if one.has_encounter] == foretold
+    assert not any(one.has_encounter for one in there.people)

@@ -117,16 +117,6 @@ def test_the_report_begins_with_its_conclusions() -> None:
     assert "95% of the messages of each kind took no longer than 6.0 ms" in said[3]
 
 
-def test_the_report_has_the_pages_own_colours() -> None:
-    page = write_report(result())
-    style = page.partition("<style>")[2].partition("</style>")[0]
-    asked = set(re.findall(r"var\((--[\w-]+)", style.partition("/* The report")[2]))
-
-    assert 'data-theme="auto"' in page
-    assert asked > {"--field", "--text", "--line"}
-    assert [name for name in asked if f"{name}:" not in style] == []
-
-
 # --- plans ----------------------------------------------------------------------------
 
 

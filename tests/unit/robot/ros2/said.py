@@ -8,7 +8,7 @@ import numpy as np
 
 from iveg.domain.observations import Instant, Observation
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.inputs import SensorInputs
+from iveg.robot.ros2.inputs import Sensed, SensorInputs
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as ros
 from iveg.ros2.messages import Message
@@ -23,7 +23,7 @@ def at(seconds: float) -> Instant:
 
 
 def stamp(seconds: float = 0.0) -> ros.Time:
-    return ros.Time.of(WALL + seconds)
+    return ros.Time.from_seconds(WALL + seconds)
 
 
 def turned(yaw: float) -> ros.Quaternion:
@@ -101,6 +101,7 @@ class Bench:
 
     Args:
         heard_for: Time since the first message of the base (s).
+        sim_time: Stamps are a simulator's.
     """
 
     def __init__(
@@ -109,19 +110,26 @@ class Bench:
         *,
         tree: bool = True,
         heard_for: float = 1.0,
+        sim_time: bool = False,
     ) -> None:
-        self.inputs = SensorInputs(config or RobotConfig())
+        self.inputs = SensorInputs(config or RobotConfig(), sim_time=sim_time)
         self.hear("tf", tf(), -heard_for)
         if tree:
             self.hear("tf_static", tf(link("base_link", "laser", 0.3)))
             self.hear("tf", tf(link("map", "odom", 10.0)))
 
     def hear(self, topic: str, message: Message, after: float = 0.0) -> "Bench":
-        self.inputs.hear(topic, [cdr.write(message)], MONO + after)
+        self.inputs.receive(topic, [cdr.write(message)], MONO + after)
         return self
 
-    def tick(self, after: float = 0.0) -> list[Observation]:
+    def sense(self, after: float = 0.0) -> list[Sensed]:
         return self.inputs.tick(at(after))
+
+    def ages(self, after: float = 0.0) -> list[float]:
+        return [round(sensed.age_s, 3) for sensed in self.sense(after)]
+
+    def tick(self, after: float = 0.0) -> list[Observation]:
+        return [sensed.observation for sensed in self.sense(after)]
 
     def only(self, kind: type[Kind], after: float = 0.0) -> Kind:
         """The one observation of this kind."""

@@ -37,7 +37,7 @@ def told(
     """What follows from a message, of a camera with depth."""
     base = said.link("map", "base_link", 11.0, 1.0, math.pi / 2)
     one = bench().hear("tf_static", tf(base)).hear("depth", depth())
-    one.inputs.hear(topic, [cdr.write(message)], MONO, form=form or type(message))
+    one.inputs.receive(topic, [cdr.write(message)], MONO, form or type(message))
     return one.only(DetectionFrame)
 
 

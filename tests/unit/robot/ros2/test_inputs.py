@@ -139,7 +139,7 @@ def test_a_clock_that_was_set_back_is_believed_and_one_that_stumbles_is_not() ->
 
 def test_bytes_of_another_layout_are_named() -> None:
     bench = Bench()
-    bench.inputs.hear("odometry", [b"\0\1\0\0short"], said.MONO)
+    bench.inputs.receive("odometry", [b"\0\1\0\0short"], said.MONO)
 
     assert bench.tick() == []
     assert bench.faults() == {"unreadable": "/odom"}

@@ -39,11 +39,7 @@ def wished(after: float) -> bytes:
 
 @pytest.mark.parametrize(
     ("forward", "code"),
-    [
-        (math.nan, "not_a_number"),
-        (1e300, "absurd"),
-        (-21.0, "absurd"),
-    ],
+    [(math.nan, "not_a_number"), (1e300, "absurd"), (-21.0, "absurd")],
 )
 def test_a_twist_that_nobody_can_mean_is_a_wish_to_rest(
     forward: float, code: str

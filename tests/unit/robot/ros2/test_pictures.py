@@ -92,9 +92,12 @@ def test_a_look_whose_depth_never_comes_counts_everybody_as_lost() -> None:
     one = bench().hear("detections_2d", look())
     one.tick()
 
-    found = one.only(DetectionFrame, 0.4)
+    (sensed,) = one.sense(0.4)
 
+    found = sensed.observation
+    assert isinstance(found, DetectionFrame)
     assert (found.detections, len(found.unread)) == ((), 1)
+    assert sensed.age_s == pytest.approx(0.4)
     assert one.faults(0.4)["no_depth"] == "/boxes"
 
 

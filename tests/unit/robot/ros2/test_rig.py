@@ -61,7 +61,7 @@ async def site(tmp_path: Path) -> AsyncIterator[Site]:
 
 def placed(network: FakeNetwork) -> None:
     """Odometry in map, as a localised robot has it."""
-    header = ros.Header(ros.Time.of(clock.wall()), "map")
+    header = ros.Header(ros.Time.from_seconds(clock.wall()), "map")
     links = (ros.TransformStamped(header, "odom"),)
     network.publish("/agi/tf", ros.TFMessage(links))
     odom = ros.Header(header.stamp, "odom")
@@ -97,7 +97,7 @@ async def test_a_second_publisher_of_the_drives_topic_makes_it_stand(
     site.network.others.append(endpoint("/agi/cmd_vel", ros.Twist))
 
     await until(lambda: "second_publisher" in site.faults())
-    await until(lambda: site.robot.node.speed_factor == 0.0)
+    await until(lambda: site.robot.node.machine.cap.factor == 0.0)
 
 
 def tell(site: Site, x: float) -> None:

@@ -7,9 +7,8 @@ robots.
 import httpx
 import pytest
 
-from iveg.domain.detector import OutOfService
+from iveg.domain.detector import OutOfService, WordAnswer
 from iveg.domain.records import DetectionRecord, LogRecord
-from iveg.domain.words import WordAnswer
 from iveg.vital.operators import Detectors
 from tests.builders import START, detection
 from tests.unit.vital.desk import conditions_of
@@ -179,7 +178,7 @@ async def test_a_word_for_a_person_has_a_ring_on_the_record_and_after_a_restart(
     assert desk.word_store.written == {"AGI/tractor": kept}
     anew = WebDesk()
     Detectors(anew.parts.core, desk.choices.kept)
-    assert anew.world.word_answers.is_person("AGI", "tractor") is True
+    assert anew.world.word_answers.meanings("AGI") == {"tractor": True}
 
 
 async def test_nobody_answers_what_was_not_asked() -> None:

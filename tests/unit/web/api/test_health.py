@@ -70,7 +70,7 @@ async def busy_desk() -> WebDesk:
     desk.look("AGII", detection("farmer", 1.5))
     await desk.wait(0.2)
     desk.report("AGI", factor=0.5, reason="person", linear=0.5)
-    desk.health_monitor.sent(Origin("b", 1), desk.clock())
+    desk.health_monitor.probe.sent(Origin("b", 1), desk.clock())
     await desk.wait(1.0)
     desk.health_monitor.received(Origin("b", 1), desk.clock())
     desk.health_monitor.received_at = desk.clock().mono

@@ -13,7 +13,7 @@ from fastapi import FastAPI
 
 from iveg.adapters.history.queries import Queries
 from iveg.domain.observations import Instant
-from iveg.domain.records import ReadingRecord
+from iveg.domain.records import DecisionRecord, ReadingRecord
 from iveg.models.history import Alert
 from iveg.web import problems
 from iveg.web.api import exports
@@ -45,12 +45,14 @@ class Past:
         self.holds()
         self.queries = Queries(url)
         self.alerts: list[Alert] = []
+        self.open: dict[str, DecisionRecord] = {}
         self.app = FastAPI()
         self.app.dependency_overrides[require("read")] = lambda: None
         self.app.include_router(
             router(
                 self.queries,
                 FakeWorker(),
+                present=self.open.get,
                 alerts=lambda: self.alerts,
                 read_clock=lambda: Instant(0.0, NOON + 60.0),
             )

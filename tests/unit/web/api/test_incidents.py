@@ -12,7 +12,6 @@ from fastapi import FastAPI
 from mcap.reader import make_reader
 
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.recordings.recorder import InputRecorder
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import LogEvent
 from iveg.domain.observations import Instant
@@ -26,6 +25,7 @@ from iveg.web.security.requirements import require
 from iveg.web.security.roles import Principal
 from tests.databases import remember
 from tests.fakes.clock import FakeClock
+from tests.fakes.recordings import input_recorder
 from tests.fakes.records import (
     NOON,
     alert_record,
@@ -48,7 +48,7 @@ class Desk:
         self.url = f"sqlite:///{folder / 'history.db'}"
         remember(self.url)
         self.queries = Queries(self.url)
-        self.recorder = InputRecorder(folder / "recordings", FakeClock())
+        self.recorder = input_recorder(folder / "recordings", FakeClock())
         self.lines: list[LogEvent] = []
         now = FakeClock()
         now.now = 3600.0

@@ -115,6 +115,20 @@ def test_without_credit_a_change_wakes_nobody(desk: WebDesk, page: Page) -> None
     assert page.subscriber.wants_telemetry
 
 
+def test_while_much_is_unpainted_a_frame_has_positions_alone(
+    desk: WebDesk, page: Page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("iveg.web.live.feed.CREDIT", 1)
+    for number in range(3):
+        desk.drive("AGI", float(number))
+        page.read()
+        desk.clock.now += 1.0
+
+    assert [move[3] for move in page.told("moves")] == [0.0, 1.0, 2.0]
+    assert [one["topic"] for one in page.told("parts")] == ["robots/AGI"]
+    assert page.feed.wait_s(desk.clock().mono) is None
+
+
 def test_a_robot_is_told_whole_once_and_then_what_changes(
     desk: WebDesk, page: Page
 ) -> None:
@@ -181,18 +195,18 @@ def filled(count: int = FRAMES) -> CreditWindow:
     """A window with that many frames on their way, all sent now."""
     window = CreditWindow()
     for _ in range(count):
-        window.sent(NOW)
+        window.sent(1, NOW)
     return window
 
 
 def test_over_a_long_round_trip_the_window_is_spread_and_not_sent_in_one_go() -> None:
     window, now = CreditWindow(), NOW
     for number in range(1, 30):
-        window.sent(now)
+        window.sent(1, now)
         window.painted(number, now + 0.3)
         now += 1.0
 
-    window.sent(now)
+    window.sent(1, now)
 
     assert window.opens_at - now == pytest.approx(0.3 / FRAMES, rel=0.01)
 
@@ -218,7 +232,7 @@ def drawn(topic: str, moment: object, within: object) -> Sketch:
     painting.adds(topic, NOW + 1.01)
     painting.sent(1, NOW + 1.01)
     painting.painted(1, moment, within, NOW + 1.05)
-    parts = [one.segments["screen"].parts() for one in watch.streams]
+    parts = [one.segments["screen"].parts() for one in watch.streams.values()]
     return merged(part for each in parts for part in each)
 
 

@@ -121,7 +121,7 @@ async def test_a_session_that_is_over_or_another_protocol_is_closed_with_its_cod
             subprotocols=protocols,
         ) as socket:
             assert await Browser(socket).close_code() == code
-    assert desk.hub.watchers == 0
+    assert not desk.hub.subscribers
 
 
 @pytest.mark.parametrize("origin", ["http://evil.test", "null", None])
@@ -249,7 +249,7 @@ async def test_a_revoked_session_can_no_longer_stop() -> None:
     desk = WebDesk()
     async with desk.serving() as address, looking(desk, address) as browser:
         await browser.read()
-        desk.authenticator.sessions._sessions.clear()
+        desk.authenticator.people.book.sessions.clear()
         await browser.say(type="stop", robot_id="AGI")
 
         assert await browser.close_code() == 4401

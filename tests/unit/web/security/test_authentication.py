@@ -13,10 +13,11 @@ from starlette.responses import Response
 
 from iveg.web import problems
 from iveg.web.security.authentication import Authenticator
-from iveg.web.security.requirements import declared_action, require
+from iveg.web.security.requirements import require
 from iveg.web.security.roles import MAY, Action, Principal
 from tests.fakes.clock import FakeClock
 from tests.fakes.doors import authenticator as door
+from tests.routes import declared_action
 
 Client = httpx.AsyncClient
 

@@ -51,7 +51,7 @@ class Server:
 
     def identify(self, connection: HTTPConnection) -> Principal | None:
         name = connection.headers["cookie"]
-        return Principal(name, "viewer", session=name.encode())
+        return Principal(name, "viewer", session=name)
 
     async def visit(self, texts: Sequence[str | float] = (), who: str = "ana") -> int:
         """Say these, let time pass (s) between; returns the close code, or 0."""

@@ -88,17 +88,11 @@ async def test_whom_the_provider_vouches_for_is_in_by_name_role_and_stable_id(
         who = desk.who(page)
         stopped = await page.post("/api/v1/robots/AGI/stop")
 
-    assert (entered.status_code, entered.headers["refresh"]) == (
-        200,
-        "0; url=/alerts?open=1",
-    )
+    assert entered.status_code == 200
+    assert entered.headers["refresh"] == "0; url=/alerts?open=1"
     assert who is not None
-    assert (who.name, who.role, who.person, who.method) == (
-        "Ana Núñez",
-        "operator",
-        desk.person,
-        "sso",
-    )
+    known = (who.name, who.role, who.person, who.method)
+    assert known == ("Ana Núñez", "operator", desk.person, "sso")
     assert stopped.status_code == 202
     (command,) = desk.commander.commands.values()
     assert command.requesters == ("Ana Núñez",)

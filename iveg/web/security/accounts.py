@@ -1,4 +1,4 @@
-"""Accounts of people and tokens of programs: known from memory, kept in a file."""
+"""Accounts of people and tokens of programs: in memory, and in a file."""
 
 import asyncio
 import logging
@@ -7,25 +7,20 @@ from typing import Final
 
 from iveg.adapters.access_file import AccessFile, earlier_sessions
 from iveg.adapters.history.queries import earlier_access, mark_moved
-from iveg.adapters.identity_provider import IdentityProvider
 from iveg.adapters.passwords import Passwords
 from iveg.domain.accounts import (
     Access,
     AccessBook,
     AccessChange,
-    ClaimReading,
     find_named,
 )
 from iveg.domain.audit import CONSOLE
 from iveg.domain.errors import HopError, NameTakenError
 from iveg.domain.events import Condition
-from iveg.settings import Settings
 from iveg.vital.audit import AuditTrail
 from iveg.vital.ports import Clock
 from iveg.vital.supervision import Supervision
-from iveg.web.security.authentication import Authenticator, Credentials
 from iveg.web.security.people import People
-from iveg.web.security.single_sign_on import SingleSignOn
 
 PART: Final = "accounts"
 SET_UP_S: Final = 1800.0
@@ -39,11 +34,11 @@ class Accounts:
     """People with accounts and programs with tokens.
 
     Args:
-        file: Remembers them.
-        database_url: Of the history, where earlier versions kept them.
-        trail: Told of each change.
-        supervision: Told of a file that is damaged or cannot be written.
-        clock: Read at each question.
+        file: Stores them.
+        database_url: Address of the history, where earlier versions kept them.
+        trail: Audit of each change.
+        supervision: Raises alerts of a file that is damaged or cannot be written.
+        clock: Read at each request.
     """
 
     def __init__(
@@ -67,40 +62,16 @@ class Accounts:
 
     @property
     def state(self) -> str:
-        """``ok``, ``damaged`` (somebody has to look) or ``unwritten``."""
+        """``ok``, ``damaged`` (a person must examine the file) or ``unwritten``."""
         if self._file.failing:
             return "unwritten"
         return "damaged" if self._file.aside else "ok"
 
-    def ways_in(
-        self,
-        settings: Settings,
-        sign_in_token: str,
-        provider: IdentityProvider | None,
-    ) -> tuple[Authenticator, SingleSignOn | None]:
-        """Authentication of people and programs, and sign-on at the identity provider.
-
-        Args:
-            settings: An operator's choices.
-            sign_in_token: Of the link; empty: there is none.
-            provider: Vouches for people; None: nobody does.
-        """
-        credentials = Credentials(
-            sign_in_token, settings.api_token, settings.sign_in_name
-        )
-        authenticator = Authenticator(credentials, self.people, self._trail)
-        if provider is None:
-            return authenticator, None
-        reading = ClaimReading(
-            settings.sso_role_claim, settings.sso_name_claim, settings.sso_role_map
-        )
-        return authenticator, SingleSignOn(provider, reading, authenticator)
-
     def first_invitation(self) -> str | None:
-        """An invitation for the first admin; None where somebody is admin already.
+        """Invitation for the first admin; None where there is an admin.
 
         Raises:
-            HopError: nobody knows yet who was in an earlier version's database.
+            HopError: accounts of an earlier version's database are not read yet.
         """
         if not self._file.copied:
             raise HopError("database", "accounts of earlier versions are not read yet")
@@ -115,7 +86,7 @@ class Accounts:
     # --- beside the requests ------------------------------------------------------
 
     async def run(self) -> None:
-        """Look after the file until cancelled."""
+        """Maintain the file until cancelled."""
         self.book.keep()
         while not self._file.copied:
             with suppress(HopError):
@@ -129,25 +100,27 @@ class Accounts:
             await asyncio.sleep(_LOOK_S)
 
     async def _take_changes(self) -> None:
-        """Have changes of the console count."""
+        """Take up changes of the console."""
         left = await asyncio.to_thread(self._file.left)
         for _, change in left:
             try:
                 self.book.apply(change)
             except NameTakenError as error:
-                _log.warning("a change of the console is left out: %s", error)
+                _log.warning("a change by `iveg user` is left out: %s", error)
+        # Deleted once they are applied: a crash must lose no change.
         if left:
             await self._file.drop([path for path, _ in left])
 
     async def copy_earlier(self) -> None:
-        """Copy who was known to an earlier version, once. Raises HopError."""
+        """Copy accounts and tokens of an earlier version, once.  Raises HopError."""
         if self._file.copied:
             return
-        found = await asyncio.to_thread(earlier_access, self._url)
+        access = await asyncio.to_thread(earlier_access, self._url)
         self._file.copied = True
-        self.book.add(found or Access())
+        self.book.add(access or Access())
         await self._file.look()
-        if found is not None and not self._file.failing:
+        # Marked as copied only where the file has them.
+        if access is not None and not self._file.failing:
             await asyncio.to_thread(mark_moved, self._url, self._clock().wall)
 
     def _note(self, change: AccessChange) -> None:
@@ -155,16 +128,18 @@ class Accounts:
         self._trail.note(change.by, change.action, name, details, at=at)
 
     def _report(self) -> None:
-        """Tell people what is wrong with the file."""
+        """Raise or clear the alerts of the file."""
         wrong: list[Condition] = []
         if self._file.aside:
-            file = {"file": self._file.aside[-1]}
-            wrong.append(Condition("P1", "alert.accounts_damaged", PART, None, file))
+            file = self._file.aside[-1]
+            wrong.append(
+                Condition.filled("P1", "alert.accounts_damaged", PART, file=file)
+            )
         if self._file.failing:
             wrong.append(Condition("P2", "alert.accounts_unwritten", PART))
         self._supervision.report(PART, wrong)
 
     def close(self) -> None:
-        """Return when the newest is on disk."""
+        """Return when the newest state is on disk."""
         self.people.close()
         self._file.close()

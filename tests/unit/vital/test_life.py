@@ -4,7 +4,6 @@ import asyncio
 
 import pytest
 
-from iveg.app.dss import live
 from iveg.domain.errors import VitalPartError
 from iveg.vital.supervision import Supervision
 from tests.fakes.clock import FakeClock
@@ -40,7 +39,7 @@ class Parts:
     async def live(self) -> None:
         vital = {"rule-loop": self.judge, "mqtt": self.talk}
         comfort = {"costmap": self.draw}
-        await live(vital, comfort, self.supervision, self.last_word)
+        await self.supervision.run(vital, comfort, self.last_word)
 
 
 async def test_f61_a_part_of_comfort_that_fails_is_started_again_and_ends_nothing() -> (
@@ -80,6 +79,6 @@ async def test_f62_a_last_word_that_fails_keeps_nobody(
         raise ConnectionResetError
 
     with pytest.raises(VitalPartError):
-        await live({"rule-loop": parts.judge}, {}, parts.supervision, fail)
+        await parts.supervision.run({"rule-loop": parts.judge}, {}, fail)
 
     assert "robots slow by themselves" in caplog.text

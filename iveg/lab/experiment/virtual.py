@@ -1,12 +1,11 @@
 """The pipeline on a virtual clock, without network, disk and operator.
 
-The same messages at the same times give the same decisions on any machine, so that a
-rule can be tried on what was recorded or simulated.
+Equal messages at equal times give equal decisions on any machine, so that a rule can be
+tried on recorded or simulated messages.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from itertools import count
-from typing import Literal
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback
@@ -25,17 +24,17 @@ START = Instant(0.0, 1_700_000_000.0)
 
 
 class VirtualPipeline:
-    """A pipeline of its own, and the ports that keep what it says.
+    """Pipeline with ports that keep its output.
 
     Args:
-        fleet, greenhouse, rule: As iVeg is started with.
+        fleet, greenhouse, rule: As at a start of iVeg.
 
     Implements ``vital.ports.FleetPort``, ``StopJournal`` and ``RecordSink``.
 
     Attributes:
         now: Its time.
         feedback: Feedback to robots, oldest first.
-        decisions: All decisions as they stand, by id.
+        decisions: Newest state of all decisions, by id.
         parts: The pipeline.
     """
 
@@ -45,6 +44,7 @@ class VirtualPipeline:
         greenhouse: Greenhouse,
         rule: DetectionRule,
     ) -> None:
+        # Counted, not random: equal runs must give equal ids.
         ids = count(1)
         self.now = START
         self.feedback: list[Feedback] = []
@@ -67,7 +67,7 @@ class VirtualPipeline:
         self.parts = Pipeline(fleet, greenhouse, ports, Choices(kept))
 
     def move(self, seconds: float) -> Instant:
-        """Set the clock to ``seconds`` after the start."""
+        """Set the clock to a time after the start (s)."""
         self.now = START.later(seconds)
         return self.now
 
@@ -90,29 +90,10 @@ class VirtualPipeline:
         if isinstance(record, DecisionRecord):
             self.decisions[record.decision_id] = record
 
-    async def keep(self, _: object) -> None:
-        """Ignore; no operator chooses anything here."""
+    async def keep(self, *_: object, **named: object) -> None:
+        """Ignore; no operator chooses or orders anything here."""
 
-    async def flushed(self) -> None:
-        """Return; nothing is stored here."""
-
-    async def set_desired_state(
-        self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
-    ) -> None:
-        """Ignore; no robot is stopped here."""
-
-    async def log_desired(
-        self,
-        robot_id: str,
-        desired: Literal["stopped", "run"],
-        hold_id: str | None,
-        by: str,
-        at: Instant,
-        *,
-        named: Sequence[str] = (),
-        challenge: str | None = None,
-    ) -> None:
-        """Ignore; no robot is stopped here."""
+    flushed = set_desired_state = log_desired = keep
 
 
 def read_direct(topic: str, payload: bytes, now: Instant) -> Iterator[Received]:

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters.access_file import AccessFile
-from iveg.app.accounts import Accounts
 from iveg.domain.accounts import AccessChange, Account, ApiToken
 from iveg.domain.errors import HopError
 from iveg.domain.records import AuditRecord
 from iveg.vital.audit import AuditTrail
 from iveg.vital.supervision import Supervision
+from iveg.web.security.accounts import Accounts
 from tests.databases import lay_history, put_into_tables
 from tests.fakes.clock import FakeClock
 from tests.fakes.recorder import FakeRecorder

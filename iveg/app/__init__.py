@@ -1,1 +1,0 @@
-"""Composition root of the DSS: settings → parts.  Wires, decides nothing."""
