@@ -4,7 +4,7 @@ They share nothing, so that a fault of one transport leaves the other alone.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Literal
 
 from iveg.adapters.mqtt import MqttLink
@@ -19,28 +19,27 @@ class _OrderTransport(ABC):
     """Orders as NGSI commands; implements ``vital.ports.CommandPort``."""
 
     @abstractmethod
-    async def _order(
-        self, robot_id: str, value: Mapping[str, object], name: str = names.COMMAND
-    ) -> None:
-        """Send a command once."""
+    async def _order(self, robot_id: str, order: codec.Order) -> None:
+        """Send an order once."""
 
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
         """Send a STOP; a repetition does no harm."""
-        await self._order(robot_id, codec.write_stop(hold_id, by))
+        await self._order(robot_id, codec.StopOrder(hold_id, by))
 
     async def release(
         self, robot_id: str, ids: Iterable[str], challenge: str, attempt: str
     ) -> None:
         """Send a release, once."""
-        await self._order(robot_id, codec.write_release(ids, challenge, attempt))
+        order = codec.ReleaseOrder(challenge, attempt, tuple(ids))
+        await self._order(robot_id, order)
 
     async def resume(self, robot_id: str, challenge: str, attempt: str) -> None:
         """Send a resume, once."""
-        await self._order(robot_id, codec.write_resume(challenge, attempt))
+        await self._order(robot_id, codec.ResumeOrder(challenge, attempt))
 
     async def goal(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
         """Send a goal or its cancellation, once."""
-        await self._order(robot_id, codec.write_goal(order), names.GOAL)
+        await self._order(robot_id, order)
 
 
 class MqttTransport(_OrderTransport):
@@ -62,18 +61,12 @@ class MqttTransport(_OrderTransport):
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
         """Publish a STOP, never retained; returns when the broker has confirmed."""
         # QoS 1: unlike a release, a copy that arrives late makes nothing drive.
-        await self._order(robot_id, codec.write_stop(hold_id, by), qos=1)
+        await self._order(robot_id, codec.StopOrder(hold_id, by), qos=1)
 
-    async def _order(
-        self,
-        robot_id: str,
-        value: Mapping[str, object],
-        name: str = names.COMMAND,
-        qos: int = 0,
-    ) -> None:
+    async def _order(self, robot_id: str, order: codec.Order, qos: int = 0) -> None:
         """Publish; at QoS 0 no client repeats an order after a lost connection."""
         topic = names.command_topic(self._apikey, robot_id)
-        await self._link.publish(topic, codec.write_command(value, name), qos=qos)
+        await self._link.publish(topic, codec.write_command(order), qos=qos)
 
     async def set_desired_state(
         self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
@@ -90,7 +83,6 @@ class OrionTransport(_OrderTransport):
     def __init__(self, orion: OrionClient) -> None:
         self._orion = orion
 
-    async def _order(
-        self, robot_id: str, value: Mapping[str, object], name: str = names.COMMAND
-    ) -> None:
+    async def _order(self, robot_id: str, order: codec.Order) -> None:
+        name, value = codec.write_order(order)
         await self._orion.update_command(robot_id, value, name=name)

@@ -16,7 +16,9 @@ A pair without a row changes nothing: an ended goal stays ended.
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field, Strict, with_config
 
 from iveg.domain.errors import CommandRefusedError
 from iveg.domain.fleet import RobotProfile
@@ -25,8 +27,10 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, SafetyReport
 from iveg.domain.robot_state import RobotState
+from iveg.domain.wire import Metres, Text
 
 GoalKind = Literal["here", "aisle", "return", "pause"]
+GoalId = Annotated[Text, Field(min_length=1, alias="id")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,14 +41,15 @@ class Goal:
         x: Position in ``map`` (m); ``y`` likewise.
     """
 
-    goal_id: str
+    goal_id: GoalId
     kind: GoalKind
-    x: float
-    y: float
+    x: Metres
+    y: Metres
 
 
+@with_config(extra="forbid")
 @dataclass(frozen=True, slots=True)
-class GoalOrder:
+class GoalOrder(Goal):
     """Order to drive to a goal, with its expiry.
 
     Attributes:
@@ -53,16 +58,16 @@ class GoalOrder:
         until_s: Expiry on the robot's own monotonic clock (s).
     """
 
-    goal: Goal
-    challenge: str
-    until_s: float
+    challenge: Annotated[str, Strict(), Field(min_length=1, alias="ch")]
+    until_s: Annotated[float, Strict(), Field(alias="until", allow_inf_nan=False)]
 
 
+@with_config(extra="forbid")
 @dataclass(frozen=True, slots=True)
 class CancelOrder:
     """Order to drop a goal and to stay."""
 
-    goal_id: str
+    goal_id: GoalId
 
 
 REASONS: Mapping[str, str] = {
@@ -282,7 +287,10 @@ def permit(robot: RobotState, stop_state: str, goal: Goal, now: Instant) -> Goal
         until_s = _own_clock(robot, report)
         if report.challenge is not None and until_s is not None:
             # The robot drops the order when iVeg stops waiting for its answer.
-            return GoalOrder(goal, report.challenge, until_s + ANSWERED_WITHIN_S)
+            until_s += ANSWERED_WITHIN_S
+            return GoalOrder(
+                goal.goal_id, goal.kind, goal.x, goal.y, report.challenge, until_s
+            )
         reason = "no_clock"
     raise refusal(robot.robot_id, reason or "no_report")
 

@@ -11,17 +11,10 @@ and every hold makes the robot forget it.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated
 
-from pydantic import Field, TypeAdapter, ValidationError
-
-from iveg.domain import wire
-from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D
-from iveg.domain.goals import CancelOrder, Goal, GoalKind, GoalOrder
+from iveg.domain.goals import CancelOrder, Goal, GoalOrder
 from iveg.domain.observations import GoalAnswer, Origin
-from iveg.ngsi import names
-from iveg.ngsi.codec import load_json
 
 Navigate = Callable[[Goal | None], bool]
 """Takes a goal, or None to give it up; returns whether it knows a way there."""
@@ -72,15 +65,15 @@ class RobotGoals:
         """Judge the first copy of an order; give every other the same answer."""
         if isinstance(order, CancelOrder):
             return self._cancel(order.goal_id)
-        goal_id = order.goal.goal_id
+        goal_id = order.goal_id
         if goal_id in self._judged:
             return [self._judged[goal_id]]
         reason = self._why_not(order, facts)
         answers = [] if reason else self._drop("replaced")
-        if reason is None and not (self._navigate and self._navigate(order.goal)):
+        if reason is None and not (self._navigate and self._navigate(order)):
             reason = "no_way"
         if reason is None:
-            self.goal, self._is_there = order.goal, False
+            self.goal, self._is_there = order, False
         return [*answers, self._judge(goal_id, reason)]
 
     def settle(self, facts: Facts) -> list[GoalAnswer]:
@@ -134,53 +127,3 @@ class RobotGoals:
 
     def _answer(self, goal_id: str, result: str, why: str | None = None) -> GoalAnswer:
         return GoalAnswer(self._id, Origin(), goal_id, result, why)
-
-
-# --- goal orders ------------------------------------------------------------------
-#
-# Messages about goals, as robots receive them.
-
-
-class _Named(wire.Wire, extra="forbid"):
-    id: Annotated[wire.Text, Field(min_length=1)]
-
-
-class _Given(_Named):
-    kind: GoalKind
-    x: wire.Metres
-    y: wire.Metres
-    ch: Annotated[str, Field(min_length=1)]
-    until: float
-
-
-class _Set(wire.Wire, extra="forbid"):
-    set: _Given
-
-
-class _Cancel(wire.Wire, extra="forbid"):
-    cancel: _Named
-
-
-_ORDER: TypeAdapter[_Set | _Cancel] = TypeAdapter(_Set | _Cancel)
-
-
-def read_goal(payload: bytes) -> GoalOrder | CancelOrder | None:
-    """Read a message of ``/{apikey}/{robot}/cmd`` that is about a goal.
-
-    Returns:
-        None for any other message, and for one that might be a STOP.
-    """
-    # A STOP goes to the safety machine, whatever else the message may mean.
-    if b"stop" in payload.lower():
-        return None
-    try:
-        message = load_json(payload)
-        if not isinstance(message, dict) or message.keys() != {names.GOAL}:
-            return None
-        order = _ORDER.validate_python(message[names.GOAL])
-    except (UnreadableError, ValidationError):
-        return None
-    if isinstance(order, _Cancel):
-        return CancelOrder(order.cancel.id)
-    goal = order.set
-    return GoalOrder(Goal(goal.id, goal.kind, goal.x, goal.y), goal.ch, goal.until)

@@ -29,13 +29,12 @@ from iveg.domain.observations import (
     Unplaced,
 )
 from iveg.ngsi import names
-from iveg.ngsi.codec import read_feedback
+from iveg.ngsi.codec import read_feedback, read_goal
 from iveg.robot.gate import FREE, Cap
-from iveg.robot.goals import Facts, Navigate, RobotGoals, read_goal
+from iveg.robot.goals import Facts, Navigate, RobotGoals
 from iveg.robot.holds import read_holds, write_holds
 from iveg.robot.judgement import DEFAULT_LIMITS, Limits
-from iveg.robot.orders import Drive, Effect, Persist, Report, SendAnswer
-from iveg.robot.safety import SafetyMachine
+from iveg.robot.safety import Drive, Effect, Persist, Report, SafetyMachine, SendAnswer
 from iveg.robot.uplink import SafetyLane, Sender, Uplink
 
 # --- pacing -----------------------------------------------------------------------

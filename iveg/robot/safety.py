@@ -19,6 +19,7 @@ docs/safety.md.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 from iveg.domain.feedback import Feedback
@@ -30,25 +31,17 @@ from iveg.domain.observations import (
     Origin,
     SafetyReport,
 )
+from iveg.ngsi.codec import (
+    ReleaseOrder,
+    ResumeOrder,
+    StopOrder,
+    read_desired_state,
+    read_order,
+)
 from iveg.robot.feedback import Authors
 from iveg.robot.gate import Cap, Gate
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import DEFAULT_LIMITS, Judgement, Limits
-from iveg.robot.orders import (
-    ATTEMPTS_KEPT,
-    AnswerCode,
-    Drive,
-    Effect,
-    Persist,
-    ReleaseOrder,
-    Report,
-    ResumeOrder,
-    SendAnswer,
-    StopOrder,
-    Verdict,
-    read_desired_state,
-    read_order,
-)
 
 State = Literal["HELD", "BRAKING", "STANDING", "READY", "RUNNING"]
 
@@ -59,6 +52,55 @@ REPORT_EVERY_S, REPORT_HELD_EVERY_S = 0.4, 0.075
 Both are below the contract's 0.5 s and 0.1 s, so that a late timer still keeps them.
 The second goes to iVeg alone: ten a second are most of what one agent can carry.
 """
+
+
+ATTEMPTS_KEPT = 64
+"""Attempts whose answer is remembered; the challenge of a forgotten one is spent, so
+that no copy of it can succeed."""
+
+_AnswerCode = Literal["LATCHED", "RELEASED", "RESUMED", "REFUSED"]
+_Verdict = tuple[str | None, _AnswerCode, str | None]
+"""Answer to a release or resume: the hold that it names, its code, and the reason of a
+refusal.  Every copy of an order gets the answer of the first, even when the robot's
+state has changed: a refused order stays refused."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Send this command to the drive at once."""
+
+    twist: Twist2D
+
+
+@dataclass(frozen=True, slots=True)
+class Persist:
+    """Store this hold set so that it survives a loss of power."""
+
+    holds: HoldSet
+
+
+@dataclass(frozen=True, slots=True)
+class SendAnswer:
+    """Answer a command on ``cmdexe``; the uplink fills in the origin."""
+
+    answer: CommandAnswer
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Publish a safety report; the uplink fills in the origin and returns its ``seq``.
+
+    Attributes:
+        is_measure: Also for the IoT Agent, which gets changes and two a second.
+    """
+
+    report: SafetyReport
+    is_measure: bool = True
+
+
+Effect = Drive | Persist | SendAnswer | Report
+"""Effect that the machine requests: first the zero command, then the hold set on disk,
+then the answer, then the report."""
 
 
 class SafetyMachine:
@@ -93,7 +135,7 @@ class SafetyMachine:
         self._resumed = False
         self._resumed_by: str | None = None
         self._challenge, self._challenge_at = fresh(), now
-        self._verdicts: dict[str, Verdict] = {}
+        self._verdicts: dict[str, _Verdict] = {}
         self._holds = (stored or HoldSet()).after_reboot()
         self._persisted: HoldSet | None = None
         self._reported: tuple[Cap, HoldSet, str, bool] | None = None
@@ -283,7 +325,7 @@ class SafetyMachine:
                 del self._verdicts[next(iter(self._verdicts))]
         return self._answer(*verdict, attempt=order.attempt)
 
-    def _release(self, order: ReleaseOrder, now: float) -> Verdict:
+    def _release(self, order: ReleaseOrder, now: float) -> _Verdict:
         first = order.ids[0]
         if set(order.ids) <= set(self._holds.released):
             # A second attempt at a release that succeeded: there is nothing to lift.
@@ -308,7 +350,7 @@ class SafetyMachine:
             return "challenge"
         return None if self._judgement.stands(now) else "not_standing"
 
-    def _resume(self, order: ResumeOrder, now: float) -> Verdict:
+    def _resume(self, order: ResumeOrder, now: float) -> _Verdict:
         # A second attempt at a resume that succeeded: the robot drives already.
         if self._resumed and order.challenge == self._resumed_by:
             return None, "RESUMED", None
@@ -329,7 +371,7 @@ class SafetyMachine:
 
     def _refuse(
         self, answered: str | None, challenge: str, why: str, now: float
-    ) -> Verdict:
+    ) -> _Verdict:
         """Refuse an order and spend its challenge, so that no later copy succeeds."""
         if challenge == self._challenge:
             self._renew_challenge(now)
@@ -338,7 +380,7 @@ class SafetyMachine:
     def _answer(
         self,
         answered: str | None,
-        code: AnswerCode,
+        code: _AnswerCode,
         why: str | None = None,
         *,
         attempt: str | None = None,

@@ -40,10 +40,7 @@ class FakeContextBroker:
         await self._ask("resume", robot_id, ())
 
     async def goal(self, robot_id: str, order: GoalOrder | CancelOrder) -> None:
-        goal_id = (
-            order.goal_id if isinstance(order, CancelOrder) else order.goal.goal_id
-        )
-        await self._ask("goal", robot_id, (goal_id,))
+        await self._ask("goal", robot_id, (order.goal_id,))
 
     def refuse(self) -> None:
         """From now on Orion is down."""

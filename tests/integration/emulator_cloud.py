@@ -84,8 +84,8 @@ class Cloud:
         newest = self.newest(robot_id, SafetyReport)
         return newest or SafetyReport(robot_id, Origin(), 0.0, "stale")
 
-    async def command(self, robot_id: str, value: dict[str, object]) -> None:
-        await self.link.publish(f"/iveg/{robot_id}/cmd", codec.write_command(value))
+    async def command(self, robot_id: str, order: codec.Order) -> None:
+        await self.link.publish(f"/iveg/{robot_id}/cmd", codec.write_command(order))
 
     def _take(self, topic: str, payload: bytes) -> None:
         device = topic.split("/")[2]

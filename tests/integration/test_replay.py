@@ -64,7 +64,7 @@ async def test_a_stop_pauses_the_log_and_the_robot_reports_standing(
     async with running(asyncio.create_task(played)):
         await until(lambda: farthest(cloud) > 0.3)
 
-        await cloud.command("AGI", {"stop": {"id": "01STOP", "by": "anna"}})
+        await cloud.command("AGI", codec.StopOrder("01STOP", "anna"))
         await until(lambda: cloud.speed("AGI") == 0.0)
         stood = cloud.of("AGI", Odometry)[-1].pose
         count = len(cloud.of("AGI", Odometry))
@@ -73,13 +73,11 @@ async def test_a_stop_pauses_the_log_and_the_robot_reports_standing(
         assert cloud.of("AGI", Odometry)[-1].pose == stood
         assert [hold.id for hold in cloud.report("AGI").holds] == ["01STOP"]
 
-        challenge = cloud.report("AGI").challenge
-        await cloud.command(
-            "AGI", codec.write_release(["01STOP"], challenge or "", "01T")
-        )
+        challenge = cloud.report("AGI").challenge or ""
+        await cloud.command("AGI", codec.ReleaseOrder(challenge, "01T", ("01STOP",)))
         await until(lambda: not cloud.report("AGI").holds)
-        challenge = cloud.report("AGI").challenge
-        await cloud.command("AGI", codec.write_resume(challenge or "", "01U"))
+        challenge = cloud.report("AGI").challenge or ""
+        await cloud.command("AGI", codec.ResumeOrder(challenge, "01U"))
         await until(lambda: cloud.of("AGI", Odometry)[-1].pose.x > stood.x + 0.3)
 
 

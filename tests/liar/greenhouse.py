@@ -128,7 +128,7 @@ class Field:
         await settle()
         stops = self.desk.fleet.stops
         for robot_id, hold_id in stops[self._orders :]:
-            order = codec.write_command(codec.write_stop(hold_id, "ana"))
+            order = codec.write_command(codec.StopOrder(hold_id, "ana"))
             self.stage.robots[robot_id].order(order, self.desk.clock())
         self._orders = len(stops)
         self.check()

@@ -124,9 +124,9 @@ class Robot:
 
     def send(self, kind: GoalKind = "here", late_s: float = 0.0) -> None:
         machine = self.node.machine
-        goal = Goal(f"01G{next(self._names)}", kind, 5.0, 0.0)
-        order = GoalOrder(goal, machine.challenge, self.now - 100.0 + 10.0 - late_s)
-        self._orders.append(codec.write_command(codec.write_goal(order), names.GOAL))
+        name, until_s = f"01G{next(self._names)}", self.now - 100.0 + 10.0 - late_s
+        order = GoalOrder(name, kind, 5.0, 0.0, machine.challenge, until_s)
+        self._orders.append(codec.write_command(order))
         self._deliver(self._orders[-1])
 
     def again(self) -> None:
@@ -137,7 +137,7 @@ class Robot:
     def cancel(self) -> None:
         goal = self.node.goals.goal
         order = CancelOrder("01G0" if goal is None else goal.goal_id)
-        self._deliver(codec.write_command(codec.write_goal(order), names.GOAL))
+        self._deliver(codec.write_command(order))
 
     def _deliver(self, payload: bytes) -> None:
         if not self.deaf:

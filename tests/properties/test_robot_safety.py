@@ -17,7 +17,7 @@ from iveg.ngsi import codec
 from iveg.robot.feedback import Authors
 from iveg.robot.gate import Cap, lowest
 from iveg.robot.judgement import Judgement, Limits
-from iveg.robot.orders import Drive
+from iveg.robot.safety import Drive
 from tests.unit.robot.hostile import (
     EVENTS,
     JUNK,

@@ -16,10 +16,10 @@ from iveg.domain.feedback import SpeedLimit
 from iveg.domain.geometry import REST, Twist2D
 from iveg.lab.emulator.ros2_base import TIMEOUT_S, DriveWatchdog
 from iveg.robot.gate import RAMP_M_S2, RAMP_RAD_S2, Cap
-from iveg.robot.orders import Drive as Told
 from iveg.robot.ros2.config import DriveConfig, RobotConfig
 from iveg.robot.ros2.outputs import DriveTopics
 from iveg.robot.ros2.reading import InputFaults, read_twist
+from iveg.robot.safety import Drive as Told
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as ros
 from tests.unit.robot.rig import STEP_S, Rig, person, release, resume, stop

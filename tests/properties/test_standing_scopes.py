@@ -12,7 +12,7 @@ from iveg.domain.observations import SafetyReport
 from iveg.domain.stop import SendStop, StopMachine
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from iveg.ngsi import codec
-from iveg.robot.orders import Effect, Report
+from iveg.robot.safety import Effect, Report
 from tests.builders import at
 from tests.unit.robot.rig import STEP_S, Rig
 
@@ -39,8 +39,8 @@ class Greenhouse:
     def press(self) -> None:
         for effect in self.iveg.press("ana", at(self.rig.now), next(self.ids)):
             if isinstance(effect, SendStop) and effect.transport == "direct":
-                payload = codec.write_stop(effect.hold_id, "ana")
-                self.rig.command(codec.write_command(payload))
+                order = codec.StopOrder(effect.hold_id, "ana")
+                self.rig.command(codec.write_command(order))
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds / STEP_S)):

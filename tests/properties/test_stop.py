@@ -43,7 +43,7 @@ from iveg.domain.stop import (
 from iveg.domain.stream_order import StreamOrder
 from iveg.domain.transports import TransportId
 from iveg.ngsi import codec
-from iveg.robot import orders as robot
+from iveg.robot import safety as robot
 from iveg.robot.holds import HoldSet
 from iveg.robot.safety import SafetyMachine
 from tests.builders import START
@@ -152,7 +152,7 @@ class StopOverBadTransports(RuleBasedStateMachine):
                 assert effect.hold_id not in self.ended - shown, "an old id came again"
                 assert effect.hold_id == self.iveg.hold_id
                 self.last_send = max(self.last_send, self.now)
-                payload = codec.write_command(codec.write_stop(effect.hold_id, "x"))
+                payload = codec.write_command(codec.StopOrder(effect.hold_id, "x"))
                 self.transports[effect.transport].put(payload)
                 facts = effect.transport, effect.command_id, self.at()
                 self.perform(self.iveg.sent(*facts, ok=True))
@@ -175,14 +175,13 @@ class StopOverBadTransports(RuleBasedStateMachine):
         assert self.asking, "I2, I6: nobody asked for this"
         self.sent_once += 1
         attempt, command = effect.attempt, effect.attempt.command
-        challenge = attempt.challenge
+        challenge, named = attempt.challenge, command.command_id
+        order = codec.ResumeOrder(challenge, named)
         if command.kind == "release":
-            value = codec.write_release(attempt.ids, challenge, command.command_id)
+            order = codec.ReleaseOrder(challenge, named, tuple(attempt.ids))
             self.remember(effect)
-        else:
-            value = codec.write_resume(challenge, command.command_id)
         for transport in command.transports:
-            self.transports[transport].put(codec.write_command(value))
+            self.transports[transport].put(codec.write_command(order))
 
     def remember(self, effect: SendOnce) -> None:
         """What the journal keeps of a release, before it goes."""
@@ -415,7 +414,7 @@ class StopOverBadTransports(RuleBasedStateMachine):
     @rule(many=st.sampled_from([1, 60]))
     def strangers_stop_the_robot(self, many: int) -> None:
         for _ in range(many):
-            payload = codec.write_command(codec.write_stop(self.new_id(), "x"))
+            payload = codec.write_command(codec.StopOrder(self.new_id(), "x"))
             self.carry(self.rig.machine.command(payload, self.now))
 
     @rule()

@@ -12,7 +12,7 @@ import pytest
 
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import CommandAnswer, SafetyReport
-from iveg.robot import orders as robot
+from iveg.robot import safety as robot
 from tests.properties.test_stop import (
     SORTS,
     TICK_S,

@@ -26,8 +26,7 @@ from iveg.ngsi import codec
 from iveg.pipeline import Pipeline
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
-from iveg.robot.orders import Drive, Effect, Report, SendAnswer
-from iveg.robot.safety import SafetyMachine
+from iveg.robot.safety import Drive, Effect, Report, SafetyMachine, SendAnswer
 from iveg.robot.uplink import Sender, Uplink
 from iveg.web.views import Views
 

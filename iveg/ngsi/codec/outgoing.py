@@ -1,13 +1,11 @@
-"""Writer of robots' messages and of orders to robots; the inverse of the readers."""
+"""Writer of robots' messages; the inverse of the readers."""
 
-from collections.abc import Iterable, Mapping
-from typing import Any, Literal
+from typing import Any
 
 import orjson
 from pydantic import TypeAdapter
 
 from iveg.domain.geometry import Twist2D
-from iveg.domain.goals import CancelOrder, GoalOrder
 from iveg.domain.kinds import kind
 from iveg.domain.observations import (
     Climate,
@@ -115,48 +113,3 @@ def write_climate(value: Climate, stamp: str) -> bytes:
 def write_heartbeat(origin: Origin) -> bytes:
     """Payload of ``/{apikey}/iveg-canary/attrs``."""
     return _dump(origin, {"probe": write_origin(origin)})
-
-
-# --- orders -----------------------------------------------------------------------
-
-
-def write_stop(hold_id: str, by: str) -> dict[str, object]:
-    """Value of ``cmd`` that stops a robot."""
-    return {"stop": {"id": hold_id, "by": by}}
-
-
-def write_release(
-    hold_ids: Iterable[str], challenge: str, attempt: str
-) -> dict[str, object]:
-    """Value of ``cmd`` that lifts exactly these holds.
-
-    Args:
-        hold_ids: Every remote hold of the robot.
-        challenge: The robot's newest challenge.
-        attempt: Id of this order, by which the robot recognises its copies.
-    """
-    return {"release": {"ids": list(hold_ids), "ch": challenge, "attempt": attempt}}
-
-
-def write_resume(challenge: str, attempt: str) -> dict[str, object]:
-    """Value of ``cmd`` that lets a released robot drive; as ``write_release``."""
-    return {"resume": {"ch": challenge, "attempt": attempt}}
-
-
-def write_goal(order: GoalOrder | CancelOrder) -> dict[str, object]:
-    """Value of ``goal`` that sets or cancels a goal."""
-    if isinstance(order, CancelOrder):
-        return {"cancel": {"id": order.goal_id}}
-    goal = order.goal
-    fields = {"id": goal.goal_id, "kind": goal.kind, "x": goal.x, "y": goal.y}
-    return {"set": {**fields, "ch": order.challenge, "until": order.until_s}}
-
-
-def write_command(value: Mapping[str, object], name: str = names.COMMAND) -> bytes:
-    """Payload of a command, as the IoT Agent publishes it on the robot's topic."""
-    return orjson.dumps({name: value})
-
-
-def write_desired(desired: Literal["stopped", "run"], ids: Iterable[str]) -> bytes:
-    """Payload of the retained desired state on ``/{robot}/iveg/desired``."""
-    return orjson.dumps({"desired": desired, "ids": list(ids)})

@@ -56,7 +56,7 @@ async def test_a_goal_goes_once_on_each_transport_with_challenge_and_deadline() 
     (orders,) = [desk.fleet.goals]
     ((robot_id, order),) = orders
     assert isinstance(order, GoalOrder)
-    assert (robot_id, order.goal.x, order.goal.y) == ("AGI", 5.0, 6.0)
+    assert (robot_id, order.x, order.y) == ("AGI", 5.0, 6.0)
     assert (order.challenge, order.until_s) == ("0123456789abcdef", 10.0)
     assert [one[0] for one in desk.broker.asked] == ["goal"]
     assert desk.fleet.stops == []

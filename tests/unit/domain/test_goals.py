@@ -141,7 +141,8 @@ def test_a_free_robot_gets_the_challenge_and_ten_seconds_of_its_own_clock() -> N
 
     order = permit(robot, "RUNNING", GOAL, at(0.2))
 
-    assert (order.goal, order.challenge) == (GOAL, FREE.challenge)
+    assert (order.goal_id, order.challenge) == (GOAL.goal_id, FREE.challenge)
+    assert (order.kind, order.x, order.y) == (GOAL.kind, GOAL.x, GOAL.y)
     assert order.until_s == 7.0 + ANSWERED_WITHIN_S
 
 

@@ -134,13 +134,16 @@ def test_stamps_are_iso_8601_in_utc_or_nothing(
 
 
 def test_commands_are_written_as_the_contract_says() -> None:
-    stop = codec.write_command(codec.write_stop("01A", "opaque"))
+    stop = codec.write_command(codec.StopOrder("01A", "opaque"))
 
     assert stop == b'{"cmd":{"stop":{"id":"01A","by":"opaque"}}}'
-    assert codec.write_release(["01A", "boot-1"], "c", "01T") == {
-        "release": {"ids": ["01A", "boot-1"], "ch": "c", "attempt": "01T"}
+    assert codec.write_order(codec.ReleaseOrder("c", "01T", ("01A", "boot-1"))) == (
+        "cmd",
+        {"release": {"ids": ["01A", "boot-1"], "ch": "c", "attempt": "01T"}},
+    )
+    assert codec.write_order(codec.ResumeOrder("c", "01T"))[1] == {
+        "resume": {"ch": "c", "attempt": "01T"}
     }
-    assert codec.write_resume("c", "01T") == {"resume": {"ch": "c", "attempt": "01T"}}
     assert codec.write_desired("stopped", ["01A"]) == (
         b'{"desired":"stopped","ids":["01A"]}'
     )

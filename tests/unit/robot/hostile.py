@@ -14,7 +14,7 @@ from iveg.domain.feedback import Feedback, SpeedLimit
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import Hold
 from iveg.robot.holds import HoldSet
-from iveg.robot.orders import Drive, Effect, Persist, Report, SendAnswer
+from iveg.robot.safety import Drive, Effect, Persist, Report, SendAnswer
 from tests.unit.robot.rig import AHEAD, REST, Rig, person, release, resume, stop
 
 SLOWLY = Twist2D(0.1, 0.0)

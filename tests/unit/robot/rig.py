@@ -14,8 +14,7 @@ from iveg.domain.parameters import Class
 from iveg.ngsi import codec
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
-from iveg.robot.orders import Drive, Effect, Persist, Report, SendAnswer
-from iveg.robot.safety import SafetyMachine
+from iveg.robot.safety import Drive, Effect, Persist, Report, SafetyMachine, SendAnswer
 from tests.patience import PATIENCE_S
 
 STEP_S = 0.05
@@ -49,16 +48,16 @@ async def until(true: Callable[[], object]) -> None:
 
 def release(ids: list[str], challenge: str, attempt: str = "") -> bytes:
     named = attempt or f"try-{next(_ATTEMPTS)}"
-    return codec.write_command(codec.write_release(ids, challenge, named))
+    return codec.write_command(codec.ReleaseOrder(challenge, named, tuple(ids)))
 
 
 def resume(challenge: str, attempt: str = "") -> bytes:
     named = attempt or f"try-{next(_ATTEMPTS)}"
-    return codec.write_command(codec.write_resume(challenge, named))
+    return codec.write_command(codec.ResumeOrder(challenge, named))
 
 
 def stop(hold_id: str) -> bytes:
-    return codec.write_command(codec.write_stop(hold_id, "opaque"))
+    return codec.write_command(codec.StopOrder(hold_id, "opaque"))
 
 
 @dataclass

@@ -9,10 +9,10 @@ from iveg.domain.geometry import Pose2D
 from iveg.domain.goals import CancelOrder, Goal, GoalOrder
 from iveg.domain.observations import GoalAnswer
 from iveg.ngsi import codec
-from iveg.robot.goals import Facts, RobotGoals, read_goal
+from iveg.ngsi.codec import read_goal
+from iveg.robot.goals import Facts, RobotGoals
 
-GOAL = Goal("01G", "here", 2.0, 3.0)
-ORDER = GoalOrder(GOAL, "c1", 17.0)
+ORDER = GoalOrder("01G", "here", 2.0, 3.0, "c1", 17.0)
 FREE = Facts(
     runs=True, challenge="c1", own_s=8.0, pose=Pose2D(0.0, 0.0, 0.0), stands=False
 )
@@ -46,7 +46,7 @@ def test_a_free_robot_takes_a_goal_and_says_when_it_is_there() -> None:
     robot = Robot()
 
     assert robot.take(ORDER) == ["01G ACCEPTED"]
-    assert robot.told == [GOAL]
+    assert robot.told == [ORDER]
     assert robot.settle(FREE) == []
     assert robot.settle(replace(THERE, stands=False)) == []
     assert robot.settle(THERE) == ["01G REACHED"]
@@ -81,16 +81,16 @@ def test_a_cancellation_that_overtakes_its_goal_wins() -> None:
 def test_a_new_goal_takes_the_place_of_the_old_one() -> None:
     robot = Robot()
     robot.take(ORDER)
-    other = replace(ORDER, goal=replace(GOAL, goal_id="01H"))
+    other = replace(ORDER, goal_id="01H")
 
     assert robot.take(other) == ["01G DROPPED replaced", "01H ACCEPTED"]
-    assert robot.goals.goal == other.goal
+    assert robot.goals.goal == other
 
 
 # --- the wire ---------------------------------------------------------------------
 
 
-SET = codec.write_goal(ORDER)["set"]
+SET = codec.write_order(ORDER)[1]["set"]
 assert isinstance(SET, dict)
 
 

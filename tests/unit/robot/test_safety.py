@@ -10,7 +10,7 @@ from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Hold, LaserScan, Origin
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
-from iveg.robot.orders import ATTEMPTS_KEPT, Report
+from iveg.robot.safety import ATTEMPTS_KEPT, Report
 from tests.unit.robot.rig import AHEAD, REST, STEP_S, Rig, person, release, resume, stop
 
 
