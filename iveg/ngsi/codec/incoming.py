@@ -6,7 +6,6 @@ have readers of their own.
 """
 
 import math
-from array import array
 from collections.abc import Callable, Container, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -41,9 +40,7 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.domain.wire import (
-    MAX_BEAMS,
     MAX_BOXES,
-    MAX_RANGE_M,
     LidarPoints,
     Metres,
     Text,
@@ -179,7 +176,7 @@ def _read_scan(
     points: str, robot_id: str, attributes: Mapping[str, object]
 ) -> LaserScan:
     """Read a scan, whose ranges are the attribute ``points``, and its header."""
-    ranges = _read_ranges(attributes[points])
+    ranges = ranges_of(_POINTS.validate_python(attributes[points]))
     header = attributes.get(names.LIDAR_HEADER)
     if header is None:
         header = {
@@ -196,41 +193,11 @@ def _read_scan(
     return scan if ranges.size > 1 else replace(scan, angle_increment=_FINEST)
 
 
-def _read_ranges(points: object) -> NDArray[np.float32]:
-    """Ranges of a scan as one buffer (m); inf without a return.
-
-    Raises:
-        ValidationError: not a list of at most 4,096 numbers and nulls in range.
-    """
-    compact = _compact(points)
-    return ranges_of(_POINTS.validate_python(points)) if compact is None else compact
-
-
 def ranges_of(points: list[float | None]) -> NDArray[np.float32]:
     """Ranges of a scan (m); inf without a return."""
     ranges = np.array(points, np.float32)
     ranges[np.isnan(ranges)] = np.inf
     return ranges
-
-
-def _compact(points: object) -> NDArray[np.float32] | None:
-    """Fast path: ranges as one buffer (m), without null and bool, all within bounds.
-
-    None where a range must be checked by itself.  A buffer stays in the processor's
-    cache until the scan is drawn; hundreds of Python's numbers do not.
-    """
-    if type(points) is not list or not 0 < len(points) <= MAX_BEAMS:
-        return None
-    try:
-        numbers = np.frombuffer(array("d", points))
-    except (TypeError, OverflowError):
-        return None
-    # A bool looks like 0 or 1 here.  `not` also refuses NaN, which JSON cannot hold.
-    if not (numbers.min() >= 0.0 and numbers.max() <= MAX_RANGE_M):
-        return None
-    if np.any(numbers == 0.0) or np.any(numbers == 1.0):
-        return None
-    return numbers.astype(np.float32)
 
 
 def _refuse_impossible(scan: LaserScan) -> None:
