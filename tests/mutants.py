@@ -225,8 +225,8 @@ MUTANTS = (
     ),
     Mutant(
         "clear: what is missing concerns its own robot alone",
-        "if observer is robot:\n        return True",
-        "if True:\n        return observer is robot",
+        "~is_far.all(axis=(0, 3)) & (maps[:, None] == maps)",
+        "np.eye(len(robots), dtype=np.bool_)",
         ("unit/domain/rule/test_clear.py",),
     ),
     Mutant(

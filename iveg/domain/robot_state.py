@@ -3,9 +3,10 @@
 Nothing here reads a clock: ages are measured from the argument ``now``.
 """
 
+import math
 from bisect import bisect_left
 from collections import defaultdict, deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
@@ -86,6 +87,7 @@ class Doubts:
 Link = Literal["UNKNOWN", "LIVE", "LATE", "LOST"]
 
 _MOST_POSES = 128
+_NOWHERE = Pose2D(math.nan, math.nan, math.nan)
 _FRAME_FRESH_S = 0.5
 """Greatest age of a detection frame that proves a spot empty (s)."""
 
@@ -190,10 +192,14 @@ class RobotState:
             return self.odometry_received.mono
         return self.pose_at
 
-    def possible_poses(self) -> tuple[Pose2D, ...]:
-        """Poses at which it may be: its own, and its last pose before a doubt."""
-        poses = () if self.odometry is None else (self.odometry.pose,)
-        return poses if self.trusted_pose is None else (*poses, self.trusted_pose)
+    def possible_places(self) -> Sequence[tuple[float, float]]:
+        """Two places in ``map`` where it may be: now, and before a doubt (m).
+
+        Both are the same where only one is known, and no numbers where none is.
+        """
+        own = None if self.odometry is None else self.odometry.pose
+        poses = [*filter(None, (own, self.trusted_pose))] or [_NOWHERE]
+        return [(pose.x, pose.y) for pose in (poses[0], poses[-1])]
 
     def link(self, now: Instant) -> Link:
         """LIVE, LATE or LOST by the age of the pose (docs/safety.md, "Age")."""

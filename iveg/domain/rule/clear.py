@@ -8,7 +8,11 @@ else; an empty list is the only way to 1.0.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, compress
 from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
@@ -41,51 +45,38 @@ def unmet_conditions(
     world: World, now: Instant
 ) -> Mapping[str, tuple[ClearCondition, ...]]:
     """Unmet conditions of each robot, the reason for its limit first."""
-    robots = world.robots.values()
-    unmet = [
-        (observer, conditions)
-        for observer in robots
-        if (conditions := [*_conditions(observer, now)])
-    ]
-    return {robot.robot_id: tuple(_unmet_by(robot, unmet, now)) for robot in robots}
+    robots = [*world.robots.values()]
+    unmet = [[*_conditions(observer, now)] for observer in robots]
+    return {
+        robot.robot_id: (
+            *_conditions_of_pose(robot, now),
+            *chain.from_iterable(compress(unmet, is_near.tolist())),
+        )
+        for robot, is_near in zip(robots, _in_reach(robots), strict=True)
+    }
 
 
-def _unmet_by(
-    robot: RobotState,
-    unmet: Sequence[tuple[RobotState, Sequence[ClearCondition]]],
-    now: Instant,
-) -> Iterator[ClearCondition]:
-    """Unmet conditions of a robot: of its own pose, then of every robot in reach."""
+def _conditions_of_pose(robot: RobotState, now: Instant) -> Iterator[ClearCondition]:
+    """Condition that a robot's own pose leaves unmet, for itself alone."""
     age = robot.age_s(now)
     if age is None or age > LIMITS.silence_s:
         yield ClearCondition("pose", robot.robot_id)
-    for observer, conditions in unmet:
-        if _is_in_reach(robot, observer):
-            yield from conditions
 
 
-def _is_in_reach(robot: RobotState, observer: RobotState) -> bool:
-    """Whether a robot may be where the observer's camera would protect it.
+def _in_reach(robots: Sequence[RobotState]) -> NDArray[np.bool_]:
+    """Whether each robot (row) may be where each observer's camera would protect it.
 
     A robot without a known place may be anywhere.  A recording's conditions concern
     recordings of the same map alone.
     """
-    if observer is robot:
-        return True
-    if observer.recording != robot.recording:
-        return False
-    observer_poses, robot_poses = observer.possible_poses(), robot.possible_poses()
+    places = [robot.possible_places() for robot in robots]
+    x, y = np.array(places).reshape(-1, 2, 2).T[:, :, :, None, None]
     # The zone of a person at the end of the camera's range reaches farther by this.
-    reach_m = observer.profile.camera_range + LIMITS.zone_most_m
-    return (
-        not observer_poses
-        or not robot_poses
-        or any(
-            pose.distance_to(own.x, own.y) <= reach_m
-            for pose in observer_poses
-            for own in robot_poses
-        )
-    )
+    reach_m = [[robot.profile.camera_range + LIMITS.zone_most_m] for robot in robots]
+    # To a place that is no number no distance is greater: it may be near.
+    is_far = np.hypot(x - x.T, y - y.T) > np.array(reach_m)
+    maps = np.array([robot.recording for robot in robots], object)
+    return np.array(~is_far.all(axis=(0, 3)) & (maps[:, None] == maps), np.bool_)
 
 
 def _conditions(observer: RobotState, now: Instant) -> Iterator[ClearCondition]:
