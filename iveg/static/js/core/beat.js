@@ -11,8 +11,8 @@ import { guarded, onNextFrame } from "./hub.js";
 /** Digits that change more often than this cannot be read (ms). */
 export const BEAT_MS = 200;
 
-/** @param {(fn: () => void) => void} [schedule] the next animation frame */
-export function createBeat(schedule = onNextFrame) {
+/** @param {(fn: () => void) => void} [schedule] */
+export function createBeat(schedule = afterNextFrame) {
   /** @type {Set<() => void>} */
   let waiting = new Set();
   let lastMs = Number.NEGATIVE_INFINITY;
@@ -24,11 +24,8 @@ export function createBeat(schedule = onNextFrame) {
     for (const fn of told) guarded(fn);
   }
 
-  /**
-   * Calls `fn` in the next of these frames, once however often it is asked for.
-   *
-   * @param {() => void} fn
-   */
+  /** Calls `fn` after the next of these frames, once however often it is asked for.
+   * @param {() => void} fn */
   return function onBeat(fn) {
     waiting.add(fn);
     if (waiting.size > 1) return;
@@ -37,6 +34,9 @@ export function createBeat(schedule = onNextFrame) {
     else schedule(beat);
   };
 }
+
+/** The map's picture does not wait for texts. @param {() => void} fn */
+const afterNextFrame = (fn) => onNextFrame(() => setTimeout(fn));
 
 /** The one beat of this page. */
 export const onBeat = createBeat();
