@@ -29,14 +29,10 @@ _SCHEMAS: Final = orjson.loads((files(__package__) / "foxglove.json").read_bytes
 _MAP, _BASE = "map", "base_link"
 _SHOWN_S: Final = 1.0
 """Time for which a box is drawn (s); the next frame replaces it before."""
-DRAWN_APART_S: Final[Mapping[type[Observation], float]] = {
-    Odometry: 0.1,
-    LaserScan: 0.2,
-    DetectionFrame: 0.2,
-}
-"""Kinds that viewers draw, and the least time between two messages of a robot (s)."""
-# A message that jitter brings a little early still counts as due.
-_EARLY: Final = 0.95
+_DRAWN: Final = frozenset({Odometry, LaserScan, DetectionFrame})
+DRAWN_APART_S: Final = 0.19
+"""Least time between two messages of a kind of a robot (s): five a second, also where
+jitter brings one a little early."""
 
 
 class Drawing:
@@ -49,11 +45,10 @@ class Drawing:
         """Messages of an observation, if its kind is due."""
         observation, now = received.observation, received.at
         stream = observation.robot_id, kind_of(observation)
-        apart_s = DRAWN_APART_S.get(stream[1])
-        if apart_s is None or now.mono < self._due.get(stream, now.mono):
+        if stream[1] not in _DRAWN or now.mono < self._due.get(stream, now.mono):
             return
         for channel, value in _drawn(observation, now.wall):
-            self._due[stream] = now.mono + apart_s * _EARLY
+            self._due[stream] = now.mono + DRAWN_APART_S
             yield channel, orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY)
 
 

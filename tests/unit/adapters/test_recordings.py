@@ -132,8 +132,8 @@ async def test_viewers_draw_poses_scans_and_boxes_thinned(site: Site) -> None:
 
     found = list(publicly(site.only()))
     assert Counter(schema for _, schema, _ in found) == {
-        "foxglove.PoseInFrame": 10,
-        "foxglove.FrameTransform": 10,
+        "foxglove.PoseInFrame": 5,
+        "foxglove.FrameTransform": 5,
         "foxglove.LaserScan": 5,
         "foxglove.SceneUpdate": 5,
     }
