@@ -69,17 +69,17 @@ export function createStatusLine({ store, i18n }) {
   /** Writes a sentence whole. @param {string} said */
   function say(said) {
     const text = need("#status-said");
-    if (text.textContent === said) return;
+    const isAsLong = text.textContent?.length === said.length;
     setText(text, said);
     place.toggleAttribute("data-very-long", said.length > VERY_LONG);
-    fit();
+    if (!isAsLong) fit();
   }
 
   /**
    * Makes letters smaller, and then the line higher, until nothing is cut: whatever the
    * window, the words beside it, the reader's smallest letters.  A line that grew stays
-   * so until the window changes: nothing below it moves to and fro.  Costs a layout, so
-   * it is asked of new sentences, and where its place or its letters change.
+   * so until the window changes: nothing below it moves to and fro.  It costs a layout, so
+   * only a sentence of another length asks for it, and where place or letters change.
    */
   function fit() {
     const text = need("#status-said");
