@@ -16,7 +16,7 @@ from benchmarks.process import print_table
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.witness import Plan
+from iveg.domain.laser import Plan
 from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named

@@ -4,7 +4,7 @@ CPU seconds per 1,000 messages of the rule loop alone, everything read already: 
 robot sends odometry, a scan and four boxes at 30 Hz, feedback is written as for MQTT.
 ``calm``: one person before each robot.  ``storm``: no two pictures alike.  Messages are
 taken one by one, as on an idle machine, and eight at a time, as when it is busy.  The
-second witness looks at scans beside it.
+laser tracks of a robot take scans beside it.
 
 ``decisions`` is a digest of all feedback and of all rows of the history: two trees that
 decide alike, to the last digit, have the same.

@@ -107,7 +107,7 @@ MUTANTS = (
         "rule: what the laser sees near a robot slows nobody",
         "return self.size_m <= _LARGEST_M or self.way_m > _MOVED_M",
         "return False",
-        ("unit/domain/test_witness.py", "unit/robot/test_safety.py"),
+        ("unit/domain/test_laser.py", "unit/robot/test_safety.py"),
     ),
     Mutant(
         "rule: one reason that is over ends the limit of all",
@@ -131,7 +131,7 @@ MUTANTS = (
         "rule: leaves, and a plan that is off, are people for the laser",
         "PLAN_M = 0.4",
         "PLAN_M = 0.1",
-        ("unit/domain/test_witness.py",),
+        ("unit/domain/test_laser.py",),
     ),
     Mutant(
         "STOP: an old refusal ends the release that is under way",

@@ -11,7 +11,7 @@ from iveg.adapters.extras import require_extra
 from iveg.adapters.mqtt import BrokerAddress, TlsFiles
 from iveg.adapters.toml_files import read_text
 from iveg.domain.errors import SettingsError
-from iveg.domain.witness import Plan
+from iveg.domain.laser import Plan
 from iveg.robot.judgement import Limits
 from iveg.robot.node import NodeSettings
 from iveg.robot.ros2.config import RobotConfig, read_config

@@ -23,7 +23,7 @@ from iveg.domain.fleet import (
     RobotProfile,
     is_robot_id,
 )
-from iveg.domain.witness import Plan
+from iveg.domain.laser import Plan
 from iveg.robot.ros2.checking import CheckRow, judge, lines
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import SensorInputs, Subscriptions

@@ -26,9 +26,9 @@ from iveg.domain.costmap import (
 )
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D, Rectangle
+from iveg.domain.laser import Outline
 from iveg.domain.observations import Origin
 from iveg.domain.peer_scan import OLDEST_S, PeerScan
-from iveg.domain.witness import Outline
 from iveg.ngsi.codec import read_peer_scan
 from iveg.robot.peer_alerts import Neighbour
 

@@ -14,10 +14,10 @@ from iveg.domain.feedback import (
     SpeedLimit,
 )
 from iveg.domain.geometry import REST, Pose2D
+from iveg.domain.laser import KnownPeer
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import FeedbackRef
 from iveg.domain.wire import FORBIDDEN
-from iveg.domain.witness import KnownPeer
 from iveg.robot.gate import FREE, Cap, CappedZone, known_reason, quantised
 from iveg.robot.peer_alerts import (
     PEER_M,

@@ -12,10 +12,10 @@ from typing import Literal
 from iveg.domain.feedback import HALF_SPEED, Feedback
 from iveg.domain.fleet import CAUTIOUS, RobotProfile
 from iveg.domain.geometry import REST, Pose2D, Twist2D
+from iveg.domain.laser import LaserTracks, Outline, Plan
 from iveg.domain.limits import LIMITS
 from iveg.domain.motion import MotionTrack
 from iveg.domain.observations import LaserScan, ReportedObstacle
-from iveg.domain.witness import Outline, Plan, Witness
 from iveg.robot.feedback import Authors, Watchdog
 from iveg.robot.gate import FREE, AppliedCap, Cap, Lookahead, lowest
 
@@ -74,7 +74,7 @@ class Judgement:
         self._motion: Placed | None = None
         self._track = MotionTrack()
         profile = limits.profile
-        self._laser = Witness(Outline(profile.length, profile.width), limits.plan)
+        self._laser = LaserTracks(Outline(profile.length, profile.width), limits.plan)
         self._lookahead = Lookahead(profile.braking)
         self._waited = AppliedCap(Cap(0.0, "watchdog"))
         self.cap = self._waited.cap

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.geometry import Pose2D, Rectangle
+from iveg.domain.laser import Outline
 from iveg.domain.observations import LaserScan
 from iveg.domain.peer_scan import peer_scan_of
-from iveg.domain.witness import Outline
 from iveg.ngsi import codec
 from iveg.robot.costmap import FleetCostmap
 from iveg.robot.node import NodeSettings, RobotNode

@@ -13,7 +13,7 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.cli.arguments import CommandCall
 from iveg.cli.nodes import node_settings
 from iveg.cli.running import report_ready, run_until_stopped, tune_garbage_collection
-from iveg.domain.witness import Plan
+from iveg.domain.laser import Plan
 from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.fleet import FleetSettings, SimulatedFleet
 from iveg.lab.emulator.layout import lay_out

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.witness import Plan
+from iveg.domain.laser import Plan
 
 Floats = NDArray[np.float64]
 Span = tuple[Floats, Floats]

@@ -11,9 +11,9 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import REST, Pose2D
+from iveg.domain.laser import Plan
 from iveg.domain.observations import Instant
 from iveg.domain.records import Json
-from iveg.domain.witness import Plan
 from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.scenarios import scenario_named

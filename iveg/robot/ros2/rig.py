@@ -15,8 +15,8 @@ from iveg.domain.errors import HopError
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Twist2D
 from iveg.domain.goals import Goal
+from iveg.domain.laser import Outline
 from iveg.domain.observations import RobotFault
-from iveg.domain.witness import Outline
 from iveg.robot.costmap import FleetCostmap
 from iveg.robot.node import NodeSettings, RobotNode, every
 from iveg.robot.ros2 import outputs

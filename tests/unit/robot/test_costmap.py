@@ -9,8 +9,8 @@ import pytest
 
 from iveg.domain.costmap import InflatedGrid
 from iveg.domain.geometry import Pose2D, Rectangle
+from iveg.domain.laser import Outline
 from iveg.domain.peer_scan import peer_scan_of
-from iveg.domain.witness import Outline
 from iveg.ngsi import codec
 from iveg.robot.costmap import FleetCostmap
 from iveg.robot.peer_alerts import Neighbour

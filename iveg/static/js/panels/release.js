@@ -117,7 +117,7 @@ export function createRelease(app, card, robotId) {
   function drawFacts(robot) {
     const facts = [
       robot?.profile && i18n.t("robot.profile", robot.profile),
-      robot && !robot.applied && i18n.t("robot.no_laser_witness"),
+      robot && !robot.applied && i18n.t("robot.no_laser_tracks"),
       robot?.transport && i18n.t(`robot.transport.${robot.transport}`),
       robot?.cmd_status && i18n.t("robot.agent", { status: robot.cmd_status }),
       robot?.clock_offset_s && i18n.t("robot.offset", { offset: robot.clock_offset_s }),

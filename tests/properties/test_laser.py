@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.laser import Plan
 from iveg.domain.observations import LaserScan, Origin
-from iveg.domain.witness import Plan
 from iveg.robot.judgement import Limits
 from tests.unit.robot.rig import AHEAD, Rig, person
 

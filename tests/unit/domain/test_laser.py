@@ -1,4 +1,4 @@
-"""The laser as a second witness (docs/safety.md, "The laser")."""
+"""Laser tracks of a robot (docs/safety.md, "The laser")."""
 
 import math
 
@@ -7,8 +7,8 @@ import pytest
 
 from iveg.domain.geometry import REST, Pose2D, Rectangle, Twist2D
 from iveg.domain.greenhouse import Greenhouse, PlacedObstacle, StructuralPost
+from iveg.domain.laser import KnownPeer, LaserTracks, Outline, Plan
 from iveg.domain.observations import LaserScan, Origin
-from iveg.domain.witness import KnownPeer, Outline, Plan, Witness
 from iveg.lab.emulator.greenhouse import Body, Disc, LaserModel, Scenery, sweep
 
 ROOM = Greenhouse(
@@ -28,7 +28,7 @@ class Beside:
 
     def __init__(self, plan: Greenhouse | None = ROOM, room: Greenhouse = ROOM) -> None:
         self.room = room
-        self.witness = Witness(
+        self.laser = LaserTracks(
             BODY, None if plan is None else Plan.from_greenhouse(plan)
         )
         self.now = 0.0
@@ -44,7 +44,7 @@ class Beside:
         peers: tuple[Pose2D, ...] = (),
         leaves: np.random.Generator | None = None,
     ) -> bool:
-        """A sweep a tenth of a second later; returns whether it is witness."""
+        """A sweep a tenth of a second later; returns whether an obstacle counts."""
         self.now += 0.1
         ranges = sweep(
             pose,
@@ -55,7 +55,7 @@ class Beside:
             self.rng,
         )
         self.hear(ranges, believed or pose, twist, peers)
-        return self.witness.obstacle(self.now) is not None
+        return self.laser.obstacle(self.now) is not None
 
     def hear(
         self,
@@ -68,7 +68,7 @@ class Beside:
             "R", Origin(), -math.pi, MODEL.angle_increment, 0.1, 30.0, HERE, ranges
         )
         known = [KnownPeer(one, self.peers_stand) for one in peers]
-        self.witness.look(scan, pose, twist, known, self.now)
+        self.laser.look(scan, pose, twist, known, self.now)
 
 
 @pytest.mark.parametrize("place", [(2.4, 0.0), (0.0, 0.65), (-1.5, 0.5), (2.2, -0.6)])

@@ -205,7 +205,7 @@ class KnownPeer:
     stands: bool
 
 
-class Witness:
+class LaserTracks:
     """Laser tracks of the obstacles beside one robot.
 
     Args:
