@@ -90,7 +90,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as directory, _site(directory) as place:
         place.start("fiware").wait_until_ready()
         place.start("serve")
-        place.wait_until_served()
+        place.wait_until_whole()
         heard, samples = asyncio.run(_run(place, minutes))
         with place.api() as api:
             counters = api.get("health").json()["counters"]
