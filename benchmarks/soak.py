@@ -3,7 +3,7 @@
 ``python -m benchmarks.soak [MINUTES]`` (10).  For each kind of message, what the broker
 passed on is what iVeg took from Orion (with ``IVEG_DIRECT_READ=safety``, so that Orion
 leaves nothing out); what robots numbered and sent on no topic was overtaken by newer
-messages of their own, which is rare.
+messages of their own, which is rare and never befalls a safety report.
 The memory of every program must be flat and all of iVeg must fit in one core.  Exit
 status 1 where one of these does not hold.
 """
@@ -161,6 +161,8 @@ def _report_messages(
             failures.append(f"{suffix[1:]}: {sent} at the broker, {taken} at iVeg")
         if overtaken > _MOST_OVERTAKEN * sent:
             failures.append(f"{suffix[1:]}: robots overtook {overtaken} of their own")
+    if numbered["_safety"] != heard.direct["_safety"]:
+        failures.append("a safety report never reached the broker")
     head = ["measure", "numbered", "overtaken on robot", "at the broker", "at iVeg"]
     print_table(f"Messages in {minutes:g} min ({machine()})", head, rows)
     return failures
