@@ -78,8 +78,8 @@ export function createStatusLine({ store, i18n }) {
   /**
    * Makes letters smaller, and then the line higher, until nothing is cut: whatever the
    * window, the words beside it, the reader's smallest letters.  A line that grew stays
-   * so until the window changes: nothing below it moves to and fro.  It costs a layout, so
-   * only a sentence of another length asks for it, and where place or letters change.
+   * so until the window changes: nothing below it moves to and fro.  Costs a layout, so
+   * it is asked where the length of the sentence, its place or its letters change.
    */
   function fit() {
     const text = need("#status-said");
